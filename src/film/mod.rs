@@ -1,0 +1,1 @@
+//! Pixel sums and their output.

@@ -1,0 +1,5 @@
+//! Pictures in memory, in and out of files, and their comparison.
+
+pub mod buffer;
+
+pub use buffer::{Image, Pixels};

@@ -1,0 +1,1 @@
+//! Rendering algorithms: one folder and one registry line each.

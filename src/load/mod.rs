@@ -1,0 +1,1 @@
+//! Scene files to SceneDesc. Knows nothing of rendering.

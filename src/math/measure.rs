@@ -1,0 +1,66 @@
+//! Densities that carry their measure in the type, so that adding a solid-angle density to an area density does not compile.
+//!
+//! The only conversions are [`SolidAnglePdf::to_area`] and [`AreaPdf::to_solid_angle`] (Veach 1997, eq. 8.8:
+//! p_A(x') = p_σ(ω) |cos θ'| / d²).
+
+/// Density per steradian.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+#[repr(transparent)]
+pub struct SolidAnglePdf(pub f32);
+
+/// Density per unit area of a surface. For a vertex at infinity it is, by convention, the density per steradian of its direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+#[repr(transparent)]
+pub struct AreaPdf(pub f32);
+
+/// Probability of one of finitely many choices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+#[repr(transparent)]
+pub struct Pmf(pub f32);
+
+impl SolidAnglePdf {
+    /// Density at the surface point a distance √`dist2` away whose normal makes `cos` with the direction.
+    pub fn to_area(self, cos: f32, dist2: f32) -> AreaPdf {
+        AreaPdf(self.0 * cos.abs() / dist2)
+    }
+}
+
+impl AreaPdf {
+    /// Density per steradian as seen from a distance √`dist2`; infinite when the surface is seen edge-on.
+    pub fn to_solid_angle(self, cos: f32, dist2: f32) -> SolidAnglePdf {
+        SolidAnglePdf(self.0 * dist2 / cos.abs())
+    }
+}
+
+impl std::ops::Mul<Pmf> for AreaPdf {
+    type Output = AreaPdf;
+    fn mul(self, p: Pmf) -> AreaPdf {
+        AreaPdf(self.0 * p.0)
+    }
+}
+
+impl std::ops::Mul<Pmf> for SolidAnglePdf {
+    type Output = SolidAnglePdf;
+    fn mul(self, p: Pmf) -> SolidAnglePdf {
+        SolidAnglePdf(self.0 * p.0)
+    }
+}
+
+impl std::ops::Mul for Pmf {
+    type Output = Pmf;
+    fn mul(self, p: Pmf) -> Pmf {
+        Pmf(self.0 * p.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conversions_are_inverse() {
+        let p = SolidAnglePdf(0.7);
+        let back = p.to_area(-0.3, 4.0).to_solid_angle(0.3, 4.0);
+        assert!((back.0 - p.0).abs() < 1e-6);
+    }
+}

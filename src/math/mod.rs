@@ -1,0 +1,15 @@
+//! Mathematics without any project types: colours, frames, warps with densities and inverses, hashed random streams,
+//! discrete and piecewise distributions, error-bounded floats, statistics.
+
+pub mod float;
+pub mod frame;
+pub mod hash;
+pub mod measure;
+pub mod rgb;
+pub mod sampler;
+pub mod warp;
+
+pub use frame::Frame;
+pub use glam::{DAffine3, DMat4, DVec3, Vec2, Vec3};
+pub use measure::{AreaPdf, Pmf, SolidAnglePdf};
+pub use rgb::Rgb;

@@ -1,0 +1,143 @@
+//! Warps of the unit square, each with its density and its inverse.
+
+use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
+
+/// Unit square → unit disk, equal areas, low distortion (Shirley & Chiu 1997). Density 1/π per unit area.
+pub fn square_to_disk(u: [f32; 2]) -> Vec2 {
+    let (a, b) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
+    let (r, phi) = if a == 0.0 && b == 0.0 {
+        return Vec2::ZERO;
+    } else if a.abs() > b.abs() {
+        (a, FRAC_PI_4 * (b / a))
+    } else {
+        (b, 2.0 * FRAC_PI_4 - FRAC_PI_4 * (a / b))
+    };
+    let (sin, cos) = phi.sin_cos();
+    Vec2::new(r * cos, r * sin)
+}
+
+/// Inverse of [`square_to_disk`].
+pub fn disk_to_square(p: Vec2) -> [f32; 2] {
+    let r = p.length();
+    if r == 0.0 {
+        return [0.5, 0.5];
+    }
+    let (a, b) = if p.x.abs() > p.y.abs() {
+        let r = r.copysign(p.x);
+        (r, r * (p.y / p.x).atan() / FRAC_PI_4)
+    } else {
+        let r = r.copysign(p.y);
+        (r * (p.x / p.y).atan() / FRAC_PI_4, r)
+    };
+    [0.5 * (a + 1.0), 0.5 * (b + 1.0)]
+}
+
+/// Unit square → hemisphere around +z, density cos θ / π per steradian.
+pub fn square_to_cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+    let d = square_to_disk(u);
+    // 1 − |d|² can round below zero at the rim.
+    Vec3::new(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
+}
+
+/// Density of [`square_to_cosine_hemisphere`] per steradian.
+pub fn cosine_hemisphere_pdf(cos: f32) -> f32 {
+    cos.max(0.0) * FRAC_1_PI
+}
+
+/// Inverse of [`square_to_cosine_hemisphere`].
+pub fn cosine_hemisphere_to_square(v: Vec3) -> [f32; 2] {
+    disk_to_square(Vec2::new(v.x, v.y))
+}
+
+/// Unit square → sphere, density 1/(4π) per steradian.
+pub fn square_to_sphere(u: [f32; 2]) -> Vec3 {
+    let z = 1.0 - 2.0 * u[0];
+    let r = (4.0 * u[0] * (1.0 - u[0])).max(0.0).sqrt();
+    let (sin, cos) = (2.0 * PI * u[1]).sin_cos();
+    Vec3::new(r * cos, r * sin, z)
+}
+
+/// Density of [`square_to_sphere`] per steradian.
+pub const SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
+
+/// Inverse of [`square_to_sphere`].
+pub fn sphere_to_square(v: Vec3) -> [f32; 2] {
+    let phi = v.y.atan2(v.x) / (2.0 * PI);
+    [0.5 * (1.0 - v.z), if phi < 0.0 { phi + 1.0 } else { phi }]
+}
+
+/// Unit square → cone around +z with cosine of half angle `cos_max`, uniform in solid angle.
+pub fn square_to_cone(u: [f32; 2], cos_max: f32) -> Vec3 {
+    // 1 − z is sampled rather than z: it keeps its precision for narrow cones.
+    let one_minus_z = u[0] * (1.0 - cos_max);
+    let r = (one_minus_z * (2.0 - one_minus_z)).max(0.0).sqrt();
+    let (sin, cos) = (2.0 * PI * u[1]).sin_cos();
+    Vec3::new(r * cos, r * sin, 1.0 - one_minus_z)
+}
+
+/// Density of [`square_to_cone`] per steradian inside the cone.
+pub fn cone_pdf(cos_max: f32) -> f32 {
+    1.0 / (2.0 * PI * (1.0 - cos_max))
+}
+
+/// Inverse of [`square_to_cone`].
+pub fn cone_to_square(v: Vec3, cos_max: f32) -> [f32; 2] {
+    let phi = v.y.atan2(v.x) / (2.0 * PI);
+    [(1.0 - v.z) / (1.0 - cos_max), if phi < 0.0 { phi + 1.0 } else { phi }]
+}
+
+/// Unit square → barycentrics (b1, b2) of a triangle, uniform in area, low distortion (Heitz 2019).
+pub fn square_to_triangle(u: [f32; 2]) -> [f32; 2] {
+    let (x, y) = if u[0] < u[1] { (0.5 * u[0], u[1] - 0.5 * u[0]) } else { (u[0] - 0.5 * u[1], 0.5 * u[1]) };
+    [x, y]
+}
+
+/// Inverse of [`square_to_triangle`].
+pub fn triangle_to_square(b: [f32; 2]) -> [f32; 2] {
+    if b[0] < b[1] { [2.0 * b[0], b[1] + b[0]] } else { [b[0] + b[1], 2.0 * b[1]] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn close(a: [f32; 2], b: [f32; 2]) -> bool {
+        (a[0] - b[0]).abs() < 2e-3 && (a[1] - b[1]).abs() < 2e-3
+    }
+
+    proptest! {
+        #[test]
+        fn inverses_round_trip(x in 0.01f32..0.99, y in 0.01f32..0.99, c in -0.9f32..0.99) {
+            let u = [x, y];
+            prop_assert!(close(disk_to_square(square_to_disk(u)), u));
+            prop_assert!(close(cosine_hemisphere_to_square(square_to_cosine_hemisphere(u)), u));
+            prop_assert!(close(sphere_to_square(square_to_sphere(u)), u));
+            prop_assert!(close(cone_to_square(square_to_cone(u, c), c), u));
+            prop_assert!(close(triangle_to_square(square_to_triangle(u)), u));
+            prop_assert!((square_to_sphere(u).length() - 1.0).abs() < 1e-5);
+            prop_assert!((square_to_cone(u, c).length() - 1.0).abs() < 1e-5);
+        }
+    }
+
+    /// Moments of the warped points against the integrals of their densities, on a regular grid.
+    #[test]
+    fn densities_match_their_warps() {
+        let n = 256;
+        let (mut cos2, mut z_sphere, mut z_cone, mut bary) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+        for i in 0..n * n {
+            let u = [((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32];
+            cos2 += f64::from(square_to_cosine_hemisphere(u).z);
+            z_sphere += f64::from(square_to_sphere(u).z.powi(2));
+            z_cone += f64::from(square_to_cone(u, 0.5).z);
+            bary += f64::from(square_to_triangle(u)[0]);
+        }
+        let mean = |s: f64| s / f64::from(n * n);
+        assert!((mean(cos2) - 2.0 / 3.0).abs() < 1e-3);
+        assert!((mean(z_sphere) - 1.0 / 3.0).abs() < 1e-3);
+        assert!((mean(z_cone) - 0.75).abs() < 1e-3);
+        assert!((mean(bary) - 1.0 / 3.0).abs() < 1e-3);
+        assert!((cone_pdf(-1.0) - SPHERE_PDF).abs() < 1e-6);
+    }
+}

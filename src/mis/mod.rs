@@ -1,0 +1,1 @@
+//! Densities and weights of every technique; nothing else computes a weight.

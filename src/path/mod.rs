@@ -1,0 +1,1 @@
+//! Vertices, sub-paths and the one random walk.

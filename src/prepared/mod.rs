@@ -1,0 +1,1 @@
+//! SceneDesc to PreparedScene: immutable, Sync, in world space.

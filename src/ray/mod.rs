@@ -1,0 +1,1 @@
+//! Ray queries behind one trait.

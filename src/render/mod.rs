@@ -1,0 +1,1 @@
+//! The driver: iterations until a budget is used up.

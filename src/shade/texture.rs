@@ -1,0 +1,3 @@
+//! Textures: colours and numbers that vary over a surface.
+/// A texture.
+pub struct Texture;

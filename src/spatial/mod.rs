@@ -1,0 +1,1 @@
+//! Spatial indices for caches and lights.
