@@ -1,1 +1,284 @@
-//! Ray queries behind one trait.
+//! Ray queries behind one trait: closest hit, occlusion of a segment, and occlusion in packets.
+//!
+//! Three backends answer the same questions: [`embree`] (Debian's Embree, the default and the only `unsafe` file), [`obvhs`] (pure
+//! Rust, for machines without Embree) and [`brute`] (every triangle in double precision, the tests' oracle). Integrators see
+//! none of them: they hold a [`Tracer`], which counts rays by kind and knows how long they took.
+//!
+//! Numerical policy: a ray leaves a surface from a point moved out by the error bound of the hit ([`offset`]), so the interval starts
+//! at the smallest positive number and, for a segment, ends one part in 2^23 before its far point. A ray with a component that is
+//! not finite is not traced: it is counted, and answered "miss" or "occluded".
+
+pub mod agreement;
+pub mod brute;
+#[cfg(any(embree3, embree4))]
+pub mod embree;
+pub mod geometry;
+pub mod obvhs;
+pub mod offset;
+pub mod tracer;
+
+pub use geometry::{Geometry, Instance, MeshBuffers, VertexBuffer};
+pub use tracer::{RayKind, RayStats, Tracer};
+
+use crate::math::Vec3;
+
+/// Beginning of every ray that leaves a surface (its origin is already off the surface).
+pub const T_MIN: f32 = f32::MIN_POSITIVE;
+/// End of a segment whose far point has parameter 1: 1 − 2⁻²³.
+pub const T_SEGMENT: f32 = 1.0 - f32::EPSILON;
+/// Rays in a packet.
+pub const PACKET: usize = 16;
+/// No instance.
+pub const NONE: u32 = u32::MAX;
+
+/// A ray with its interval; `d` need not be normalised, `t` counts in lengths of `d`.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Origin.
+    pub o: Vec3,
+    /// Direction.
+    pub d: Vec3,
+    /// Beginning of the interval, ≥ 0.
+    pub t_min: f32,
+    /// End of the interval; may be infinite.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// A ray that leaves a surface point (already offset) and goes on for ever.
+    pub fn leaving(o: Vec3, d: Vec3) -> Ray {
+        Ray { o, d, t_min: T_MIN, t_max: f32::INFINITY }
+    }
+
+    /// True if the backends may see it: every component finite and of a size that does not overflow, t_min ≥ 0, no NaN.
+    /// (Debian 12's Embree aborts the process on others.)
+    #[inline]
+    pub fn is_valid(&self) -> bool {
+        // A sum rather than a maximum: `f32::max` drops NaN, a sum keeps it.
+        let sum = self.o.abs().element_sum() + self.d.abs().element_sum();
+        sum < 1e18 && self.t_min >= 0.0 && !self.t_max.is_nan()
+    }
+}
+
+/// What a ray met first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Ray parameter.
+    pub t: f32,
+    /// Barycentric coordinate of the triangle's second vertex.
+    pub u: f32,
+    /// Barycentric coordinate of the triangle's third vertex.
+    pub v: f32,
+    /// Triangle of the mesh.
+    pub triangle: u32,
+    /// Mesh of the [`Geometry`].
+    pub mesh: u32,
+    /// Instance of the [`Geometry`], or [`NONE`].
+    pub instance: u32,
+}
+
+/// A question of visibility: is there anything between `o` and `o + t_max·d`?
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    /// Near point, already off its surface.
+    pub o: Vec3,
+    /// To the far point, or, with an infinite `t_max`, the direction.
+    pub d: Vec3,
+    /// [`T_SEGMENT`] or infinite.
+    pub t_max: f32,
+}
+
+impl Segment {
+    /// Between two points that are off their surfaces.
+    pub fn between(a: Vec3, b: Vec3) -> Segment {
+        Segment { o: a, d: b - a, t_max: T_SEGMENT }
+    }
+
+    /// From a point that is off its surface to infinity.
+    pub fn to_infinity(o: Vec3, d: Vec3) -> Segment {
+        Segment { o, d, t_max: f32::INFINITY }
+    }
+
+    /// As a ray.
+    pub fn ray(&self) -> Ray {
+        Ray { o: self.o, d: self.d, t_min: T_MIN, t_max: self.t_max }
+    }
+}
+
+/// Up to sixteen segments side by side, as the packet queries want them.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct SegmentPacket {
+    /// Origins.
+    pub o: [[f32; PACKET]; 3],
+    /// Directions.
+    pub d: [[f32; PACKET]; 3],
+    /// Ends.
+    pub t_max: [f32; PACKET],
+    /// Segments in use.
+    pub len: usize,
+}
+
+impl Default for SegmentPacket {
+    fn default() -> Self {
+        SegmentPacket { o: [[0.0; PACKET]; 3], d: [[0.0; PACKET]; 3], t_max: [0.0; PACKET], len: 0 }
+    }
+}
+
+impl SegmentPacket {
+    /// Appends a segment.
+    ///
+    /// # Panics
+    /// If the packet is full.
+    #[inline]
+    pub fn push(&mut self, s: &Segment) {
+        let i = self.len;
+        for (axis, (o, d)) in s.o.to_array().into_iter().zip(s.d.to_array()).enumerate() {
+            self.o[axis][i] = o;
+            self.d[axis][i] = d;
+        }
+        self.t_max[i] = s.t_max;
+        self.len = i + 1;
+    }
+
+    /// Segment `i` again.
+    pub fn get(&self, i: usize) -> Segment {
+        let at = |a: &[[f32; PACKET]; 3]| Vec3::new(a[0][i], a[1][i], a[2][i]);
+        Segment { o: at(&self.o), d: at(&self.d), t_max: self.t_max[i] }
+    }
+}
+
+/// Far points of many segments, one array per axis, ideally sorted by position. They are already off their surfaces.
+#[derive(Clone, Copy, Debug)]
+pub struct Targets<'a> {
+    /// x.
+    pub x: &'a [f32],
+    /// y.
+    pub y: &'a [f32],
+    /// z.
+    pub z: &'a [f32],
+}
+
+impl Targets<'_> {
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.x.is_empty()
+    }
+
+    /// Point `i`.
+    pub fn get(&self, i: usize) -> Vec3 {
+        Vec3::new(self.x[i], self.y[i], self.z[i])
+    }
+}
+
+/// A backend: answers questions about one immutable scene, from any number of threads at once.
+pub trait RayQuery: Send + Sync {
+    /// Name and version, for people.
+    fn describe(&self) -> String;
+
+    /// The first thing the ray meets. The ray must be valid ([`Ray::is_valid`]).
+    fn closest(&self, ray: &Ray) -> Option<Hit>;
+
+    /// Is anything in the ray's interval? The ray must be valid.
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// Bit `i` set: segment `i` of the packet is blocked. Segments that are not valid are reported blocked, with their number in
+    /// the second value.
+    fn occluded_packet(&self, packet: &SegmentPacket) -> (u16, u32) {
+        let (mut mask, mut invalid) = (0, 0);
+        for i in 0..packet.len {
+            let ray = packet.get(i).ray();
+            let valid = ray.is_valid();
+            invalid += u32::from(!valid);
+            if !valid || self.occluded(&ray) {
+                mask |= 1 << i;
+            }
+        }
+        (mask, invalid)
+    }
+
+    /// One origin against many targets (a visibility pmf): bit `i % 64` of `blocked[i / 64]` is set if target `i` is not seen.
+    ///
+    /// # Panics
+    /// If `blocked` is shorter than the targets need.
+    fn occluded_from(&self, origin: Vec3, targets: Targets, blocked: &mut [u64]) -> u32 {
+        blocked[..targets.len().div_ceil(64)].fill(0);
+        let (mut packet, mut invalid) = (SegmentPacket::default(), 0);
+        for first in (0..targets.len()).step_by(PACKET) {
+            packet.len = 0;
+            for i in first..targets.len().min(first + PACKET) {
+                packet.push(&Segment::between(origin, targets.get(i)));
+            }
+            let (mask, bad) = self.occluded_packet(&packet);
+            invalid += bad;
+            blocked[first / 64] |= u64::from(mask) << (first % 64);
+        }
+        invalid
+    }
+
+    /// A tile of up to sixteen neighbouring origins against many targets, the fastest form: bit `k` of `blocked[i]` is set if
+    /// origin `k` does not see target `i`.
+    ///
+    /// # Panics
+    /// If there are more than sixteen origins or `blocked` is shorter than the targets.
+    fn occluded_tile(&self, origins: &[Vec3], targets: Targets, blocked: &mut [u16]) -> u32 {
+        let (mut packet, mut invalid) = (SegmentPacket::default(), 0);
+        for (i, out) in blocked[..targets.len()].iter_mut().enumerate() {
+            packet.len = 0;
+            let target = targets.get(i);
+            for &origin in origins {
+                packet.push(&Segment::between(origin, target));
+            }
+            let (mask, bad) = self.occluded_packet(&packet);
+            invalid += bad;
+            *out = mask;
+        }
+        invalid
+    }
+}
+
+/// Which backend to build.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Backend {
+    /// Debian's Embree.
+    Embree,
+    /// Pure Rust.
+    Obvhs,
+    /// Every triangle, in double precision.
+    Brute,
+}
+
+impl Backend {
+    /// Embree where the program was built with it.
+    pub fn default_available() -> Backend {
+        if cfg!(any(embree3, embree4)) { Backend::Embree } else { Backend::Obvhs }
+    }
+
+    /// Builds the acceleration structure; `threads` is a limit for the builder.
+    ///
+    /// # Errors
+    /// If the backend is not part of this program or reports a failure.
+    pub fn build(self, geometry: std::sync::Arc<Geometry>, threads: usize) -> Result<Box<dyn RayQuery>, QueryError> {
+        match self {
+            #[cfg(any(embree3, embree4))]
+            Backend::Embree => Ok(Box::new(embree::EmbreeScene::build(geometry, threads)?)),
+            #[cfg(not(any(embree3, embree4)))]
+            Backend::Embree => {
+                let _ = threads;
+                Err(QueryError("this program was built without Embree; use --query obvhs".into()))
+            }
+            Backend::Obvhs => Ok(Box::new(obvhs::ObvhsScene::build(&geometry)?)),
+            Backend::Brute => Ok(Box::new(brute::BruteScene::build(&geometry))),
+        }
+    }
+}
+
+/// A backend failed.
+#[derive(Debug, thiserror::Error)]
+#[error("ray queries: {0}")]
+pub struct QueryError(pub String);

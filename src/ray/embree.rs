@@ -1,0 +1,432 @@
+//! The Embree backend, and the only place with `unsafe` code.
+//!
+//! Embree 3 (Debian 12) and Embree 4 (Debian 13) differ in how a query passes its context and in a few sizes; all of that is
+//! in the module `version` below. Scenes are built with the ROBUST flag (no leaks at shared edges, and packets of any width give the
+//! answers of single rays) at medium quality; packets are never flagged coherent, which is slower.
+#![allow(unsafe_code)]
+
+use super::geometry::Geometry;
+use super::{Hit, NONE, PACKET, QueryError, Ray, RayQuery, SegmentPacket, T_MIN};
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::sync::{Arc, Mutex};
+
+#[allow(
+    missing_docs,
+    non_camel_case_types,
+    non_snake_case,
+    non_upper_case_globals,
+    dead_code,
+    clippy::all,
+    clippy::pedantic
+)]
+mod sys {
+    include!(concat!(env!("OUT_DIR"), "/embree.rs"));
+}
+use sys::*;
+
+/// What differs between the versions.
+#[cfg(embree3)]
+mod version {
+    use super::sys::*;
+
+    /// `rtcInitIntersectContext` is an inline function of the C header and has no symbol.
+    fn context() -> RTCIntersectContext {
+        RTCIntersectContext {
+            flags: RTCIntersectContextFlags::RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT,
+            filter: None,
+            instID: [u32::MAX],
+        }
+    }
+
+    /// # Safety
+    /// `scene` is committed and alive; `rayhit` holds a valid ray.
+    pub unsafe fn intersect1(scene: RTCScene, rayhit: &mut RTCRayHit) {
+        // SAFETY: the caller's promise; the context lives until the call returns.
+        unsafe { rtcIntersect1(scene, &mut context(), rayhit) }
+    }
+
+    /// # Safety
+    /// As [`intersect1`].
+    pub unsafe fn occluded1(scene: RTCScene, ray: &mut RTCRay) {
+        // SAFETY: the caller's promise.
+        unsafe { rtcOccluded1(scene, &mut context(), ray) }
+    }
+
+    /// # Safety
+    /// As [`intersect1`]; lanes whose `valid` is zero are not looked at.
+    pub unsafe fn occluded16(scene: RTCScene, valid: &super::Valid, rays: &mut RTCRay16) {
+        // SAFETY: the caller's promise; `Valid` and `RTCRay16` have the alignment of 64 bytes that the call wants.
+        unsafe { rtcOccluded16(valid.0.as_ptr(), scene, &mut context(), rays) }
+    }
+}
+
+/// What differs between the versions.
+#[cfg(embree4)]
+mod version {
+    use super::sys::*;
+    use std::ptr::null_mut;
+
+    /// # Safety
+    /// `scene` is committed and alive; `rayhit` holds a valid ray.
+    pub unsafe fn intersect1(scene: RTCScene, rayhit: &mut RTCRayHit) {
+        // SAFETY: the caller's promise; null arguments mean the defaults (all features, incoherent).
+        unsafe { rtcIntersect1(scene, rayhit, null_mut()) }
+    }
+
+    /// # Safety
+    /// As [`intersect1`].
+    pub unsafe fn occluded1(scene: RTCScene, ray: &mut RTCRay) {
+        // SAFETY: the caller's promise.
+        unsafe { rtcOccluded1(scene, ray, null_mut()) }
+    }
+
+    /// # Safety
+    /// As [`intersect1`]; lanes whose `valid` is zero are not looked at.
+    pub unsafe fn occluded16(scene: RTCScene, valid: &super::Valid, rays: &mut RTCRay16) {
+        // SAFETY: the caller's promise; `Valid` and `RTCRay16` have the alignment of 64 bytes that the call wants.
+        unsafe { rtcOccluded16(valid.0.as_ptr(), scene, rays, null_mut()) }
+    }
+}
+
+/// Lane mask of a packet: −1 for a lane in use.
+#[repr(C, align(64))]
+struct Valid([i32; PACKET]);
+
+/// The first error that Embree reported, if any. Boxed: Embree keeps its address.
+type ErrorSlot = Mutex<Option<String>>;
+
+/// Embree calls this on every error; it must not unwind.
+unsafe extern "C" fn on_error(user: *mut c_void, code: RTCError, message: *const c_char) {
+    if user.is_null() {
+        return;
+    }
+    // SAFETY: `user` is the address of the device's `ErrorSlot`, which lives until after the device is released.
+    let slot = unsafe { &*user.cast::<ErrorSlot>() };
+    let text = if message.is_null() {
+        String::new()
+    } else {
+        // SAFETY: Embree passes a NUL-terminated string that lives during the call.
+        unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned()
+    };
+    if let Ok(mut first) = slot.lock() {
+        first.get_or_insert_with(|| format!("Embree error {}: {text}", code.0));
+    }
+}
+
+/// An Embree device with its error slot; released on drop.
+struct Device {
+    raw: RTCDevice,
+    errors: Box<ErrorSlot>,
+}
+
+// SAFETY: Embree's manual (§ "Embree API") says that API calls on a device are thread-safe unless they modify the same object; this
+// type only creates and queries, and modification happens through `&mut` or before the scene is shared.
+unsafe impl Send for Device {}
+// SAFETY: as above.
+unsafe impl Sync for Device {}
+
+impl Device {
+    fn new(threads: usize) -> Result<Device, QueryError> {
+        let config = CString::new(format!("threads={threads}")).map_err(|e| QueryError(e.to_string()))?;
+        // SAFETY: the configuration is a NUL-terminated string that outlives the call.
+        let raw = unsafe { rtcNewDevice(config.as_ptr()) };
+        if raw.is_null() {
+            // SAFETY: a null device asks for the thread's error of the failed creation.
+            let code = unsafe { rtcGetDeviceError(std::ptr::null_mut()) };
+            return Err(QueryError(format!("Embree could not create a device (error {})", code.0)));
+        }
+        let errors = Box::new(ErrorSlot::default());
+        let user = std::ptr::from_ref::<ErrorSlot>(&errors).cast_mut().cast::<c_void>();
+        // SAFETY: the slot is boxed and outlives the device, which is released in `drop` before the box is freed.
+        unsafe { rtcSetDeviceErrorFunction(raw, Some(on_error), user) };
+        Ok(Device { raw, errors })
+    }
+
+    /// Turns a reported error into a `Result`.
+    fn check(&self) -> Result<(), QueryError> {
+        match self.errors.lock().ok().and_then(|mut e| e.take()) {
+            Some(message) => Err(QueryError(message)),
+            None => Ok(()),
+        }
+    }
+
+    fn version(&self) -> String {
+        // SAFETY: the device is alive.
+        let get = |p| unsafe { rtcGetDeviceProperty(self.raw, p) };
+        format!(
+            "{}.{}.{}",
+            get(RTCDeviceProperty::RTC_DEVICE_PROPERTY_VERSION_MAJOR),
+            get(RTCDeviceProperty::RTC_DEVICE_PROPERTY_VERSION_MINOR),
+            get(RTCDeviceProperty::RTC_DEVICE_PROPERTY_VERSION_PATCH)
+        )
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: created by `rtcNewDevice`, released once.
+        unsafe { rtcReleaseDevice(self.raw) };
+    }
+}
+
+/// A committed scene, released on drop.
+struct SceneHandle(RTCScene);
+
+impl Drop for SceneHandle {
+    fn drop(&mut self) {
+        // SAFETY: created by `rtcNewScene`, released once; Embree keeps what instances still refer to.
+        unsafe { rtcReleaseScene(self.0) };
+    }
+}
+
+/// A scene of shared vertex and index buffers. Fields are dropped in order: scenes, then the device, then the buffers.
+pub struct EmbreeScene {
+    top: SceneHandle,
+    _groups: Vec<SceneHandle>,
+    device: Device,
+    geometry: Arc<Geometry>,
+}
+
+// SAFETY: queries on a committed scene are read-only and may run on any number of threads (Embree's manual, § "rtcIntersect1"); the
+// handles are never modified after `build`.
+unsafe impl Send for EmbreeScene {}
+// SAFETY: as above.
+unsafe impl Sync for EmbreeScene {}
+
+impl EmbreeScene {
+    /// Builds the tree with at most `threads` threads.
+    ///
+    /// # Errors
+    /// If Embree reports one.
+    pub fn build(geometry: Arc<Geometry>, threads: usize) -> Result<EmbreeScene, QueryError> {
+        let device = Device::new(threads)?;
+        let mut groups = Vec::with_capacity(geometry.groups.len());
+        for meshes in &geometry.groups {
+            let scene = new_scene(&device);
+            for (id, &mesh) in meshes.iter().enumerate() {
+                attach_mesh(&device, &scene, &geometry, mesh, id as u32);
+            }
+            commit(&scene);
+            device.check()?;
+            groups.push(scene);
+        }
+        let top = new_scene(&device);
+        for (id, &mesh) in geometry.world.iter().enumerate() {
+            attach_mesh(&device, &top, &geometry, mesh, id as u32);
+        }
+        for (i, instance) in geometry.instances.iter().enumerate() {
+            let id = (geometry.world.len() + i) as u32;
+            attach_instance(&device, &top, &groups[instance.group as usize], instance, id);
+        }
+        commit(&top);
+        device.check()?;
+        Ok(EmbreeScene { top, _groups: groups, device, geometry })
+    }
+}
+
+fn new_scene(device: &Device) -> SceneHandle {
+    // SAFETY: the device is alive; flags and quality are set before anything is attached.
+    unsafe {
+        let scene = rtcNewScene(device.raw);
+        rtcSetSceneFlags(scene, RTCSceneFlags::RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneBuildQuality(scene, RTCBuildQuality::RTC_BUILD_QUALITY_MEDIUM);
+        SceneHandle(scene)
+    }
+}
+
+fn attach_mesh(device: &Device, scene: &SceneHandle, geometry: &Geometry, mesh: u32, id: u32) {
+    let buffers = &geometry.meshes[mesh as usize];
+    // SAFETY: device and scene are alive. The buffers are owned by the `Geometry` that the finished `EmbreeScene` holds, are never
+    // moved or written, hold one spare vertex behind the last (`VertexBuffer`), and every index is in range by `MeshBuffers`' contract
+    // (Embree drops a triangle whose index is not). The geometry handle is released after the scene holds its own reference.
+    unsafe {
+        let handle = rtcNewGeometry(device.raw, RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE);
+        rtcSetSharedGeometryBuffer(
+            handle,
+            RTCBufferType::RTC_BUFFER_TYPE_VERTEX,
+            0,
+            RTCFormat::RTC_FORMAT_FLOAT3,
+            buffers.positions.as_ptr().cast::<c_void>(),
+            0,
+            12,
+            buffers.positions.len(),
+        );
+        rtcSetSharedGeometryBuffer(
+            handle,
+            RTCBufferType::RTC_BUFFER_TYPE_INDEX,
+            0,
+            RTCFormat::RTC_FORMAT_UINT3,
+            buffers.triangles.as_ptr().cast::<c_void>(),
+            0,
+            12,
+            buffers.triangles.len(),
+        );
+        // Embree 4's default mask is 1, Embree 3's is all ones.
+        rtcSetGeometryMask(handle, u32::MAX);
+        rtcCommitGeometry(handle);
+        rtcAttachGeometryByID(scene.0, handle, id);
+        rtcReleaseGeometry(handle);
+    }
+}
+
+fn attach_instance(
+    device: &Device,
+    scene: &SceneHandle,
+    group: &SceneHandle,
+    instance: &super::geometry::Instance,
+    id: u32,
+) {
+    let m = instance.to_world.matrix3;
+    let columns: [[f32; 3]; 4] =
+        [m.x_axis.to_array(), m.y_axis.to_array(), m.z_axis.to_array(), instance.to_world.translation.to_array()];
+    // SAFETY: device, scene and group are alive; the matrix is copied during the call.
+    unsafe {
+        let handle = rtcNewGeometry(device.raw, RTCGeometryType::RTC_GEOMETRY_TYPE_INSTANCE);
+        rtcSetGeometryInstancedScene(handle, group.0);
+        rtcSetGeometryTimeStepCount(handle, 1);
+        rtcSetGeometryTransform(handle, 0, RTCFormat::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.as_ptr().cast());
+        rtcSetGeometryMask(handle, u32::MAX);
+        rtcCommitGeometry(handle);
+        rtcAttachGeometryByID(scene.0, handle, id);
+        rtcReleaseGeometry(handle);
+    }
+}
+
+fn commit(scene: &SceneHandle) {
+    // SAFETY: the scene is alive and no other thread uses it yet.
+    unsafe { rtcCommitScene(scene.0) };
+}
+
+#[inline]
+fn raw_ray(ray: &Ray) -> RTCRay {
+    debug_assert!(ray.is_valid());
+    RTCRay {
+        org_x: ray.o.x,
+        org_y: ray.o.y,
+        org_z: ray.o.z,
+        tnear: ray.t_min,
+        dir_x: ray.d.x,
+        dir_y: ray.d.y,
+        dir_z: ray.d.z,
+        time: 0.0,
+        tfar: ray.t_max,
+        mask: u32::MAX,
+        id: 0,
+        flags: 0,
+    }
+}
+
+impl RayQuery for EmbreeScene {
+    fn describe(&self) -> String {
+        format!("Embree {}", self.device.version())
+    }
+
+    #[inline]
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        let mut rayhit = RTCRayHit { ray: raw_ray(ray), hit: RTCHit::default() };
+        rayhit.hit.geomID = u32::MAX;
+        rayhit.hit.instID = [u32::MAX];
+        // SAFETY: the scene is committed and alive, the ray is valid (checked by the caller, see `Ray::is_valid`), and the
+        // structure has the alignment bindgen read off the header.
+        unsafe { version::intersect1(self.top.0, &mut rayhit) };
+        let hit = &rayhit.hit;
+        if hit.geomID == u32::MAX {
+            return None;
+        }
+        let (mesh, instance) = if hit.instID[0] == u32::MAX {
+            (self.geometry.world[hit.geomID as usize], NONE)
+        } else {
+            let instance = hit.instID[0] - self.geometry.world.len() as u32;
+            let group = self.geometry.instances[instance as usize].group;
+            (self.geometry.groups[group as usize][hit.geomID as usize], instance)
+        };
+        Some(Hit { t: rayhit.ray.tfar, u: hit.u, v: hit.v, triangle: hit.primID, mesh, instance })
+    }
+
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        let mut raw = raw_ray(ray);
+        // SAFETY: as in `closest`.
+        unsafe { version::occluded1(self.top.0, &mut raw) };
+        // Embree sets tfar to −∞ when something is in the way.
+        raw.tfar < 0.0
+    }
+
+    fn occluded_packet(&self, packet: &SegmentPacket) -> (u16, u32) {
+        let mut rays = RTCRay16 {
+            org_x: packet.o[0],
+            org_y: packet.o[1],
+            org_z: packet.o[2],
+            tnear: [T_MIN; PACKET],
+            dir_x: packet.d[0],
+            dir_y: packet.d[1],
+            dir_z: packet.d[2],
+            time: [0.0; PACKET],
+            tfar: packet.t_max,
+            mask: [u32::MAX; PACKET],
+            id: [0; PACKET],
+            flags: [0; PACKET],
+        };
+        // The test of `Ray::is_valid`, lane by lane so that it vectorises; lanes that fail it or are not in use stay out.
+        let mut valid = Valid([0; PACKET]);
+        for i in 0..PACKET {
+            let sum = rays.org_x[i].abs()
+                + rays.org_y[i].abs()
+                + rays.org_z[i].abs()
+                + rays.dir_x[i].abs()
+                + rays.dir_y[i].abs()
+                + rays.dir_z[i].abs();
+            valid.0[i] = -i32::from(sum < 1e18 && i < packet.len);
+        }
+        // SAFETY: the scene is committed and alive; lanes in use hold valid rays; alignment by the types.
+        unsafe { version::occluded16(self.top.0, &valid, &mut rays) };
+        let (mut mask, mut invalid) = (0u16, 0);
+        for i in 0..packet.len {
+            let bad = valid.0[i] == 0;
+            invalid += u32::from(bad);
+            mask |= u16::from(bad || rays.tfar[i] < 0.0) << i;
+        }
+        (mask, invalid)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::ray::{MeshBuffers, Segment, VertexBuffer};
+
+    fn one_triangle() -> Arc<Geometry> {
+        let mesh = MeshBuffers {
+            positions: VertexBuffer::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y]),
+            triangles: vec![[0, 1, 2]],
+        };
+        Arc::new(Geometry { meshes: vec![mesh], world: vec![0], ..Geometry::default() })
+    }
+
+    #[test]
+    fn an_error_surfaces_as_an_error() {
+        let device = Device::new(1).unwrap();
+        assert!(device.check().is_ok());
+        // SAFETY: Embree reports a null geometry as an invalid argument and does nothing.
+        unsafe { rtcCommitGeometry(std::ptr::null_mut()) };
+        // The report has no device to go to, so the slot stays empty; a null instanced scene of a live device has one.
+        let scene = new_scene(&device);
+        // SAFETY: the scene is alive; the null geometry is reported, not followed.
+        unsafe { rtcAttachGeometryByID(scene.0, std::ptr::null_mut(), 0) };
+        assert!(device.check().is_err());
+        assert!(device.check().is_ok(), "an error is reported once");
+    }
+
+    #[test]
+    fn invalid_rays_are_filtered_in_packets() {
+        let scene = EmbreeScene::build(one_triangle(), 1).unwrap();
+        let mut packet = SegmentPacket::default();
+        let from = Vec3::new(0.25, 0.25, 1.0);
+        packet.push(&Segment::between(from, Vec3::new(0.25, 0.25, -1.0)));
+        packet.push(&Segment::between(Vec3::new(f32::NAN, 0.0, 0.0), from));
+        packet.push(&Segment::between(from, Vec3::new(f32::INFINITY, 0.0, 0.0)));
+        packet.push(&Segment::between(from, Vec3::new(2.0, 2.0, 2.0)));
+        assert_eq!(scene.occluded_packet(&packet), (0b0111, 2));
+    }
+}

@@ -1,0 +1,110 @@
+//! Where a ray leaves a surface from: outside the error bound of the hit point, never at a constant distance.
+//!
+//! A hit point is interpolated from the triangle's corners, so it is off the triangle's plane by at most γ(7)·Σ|b_i v_i| (Pharr,
+//! Jakob, Humphreys, "Physically Based Rendering", §6.8). The largest component serves for all three. Moving by that bound along the
+//! normal, and rounding outward, leaves no false self-hit and no leak at any scale of a scene that is centred.
+
+use super::Segment;
+use crate::math::{Vec3, float::gamma};
+
+/// Error bound of a point interpolated between corners with weights that sum to one.
+#[inline]
+pub fn barycentric_error(corners: &[Vec3; 3], b: [f32; 3]) -> f32 {
+    let sum = corners[0].abs() * b[0].abs() + corners[1].abs() * b[1].abs() + corners[2].abs() * b[2].abs();
+    gamma(7) * sum.max_element()
+}
+
+/// Moves `p` off its surface to the side to which `towards` points.
+#[inline]
+pub fn offset_point(p: Vec3, error: f32, ng: Vec3, towards: Vec3) -> Vec3 {
+    let distance = error * ng.abs().element_sum();
+    let offset = ng * if towards.dot(ng) < 0.0 { -distance } else { distance };
+    let moved = p + offset;
+    let round = |m: f32, o: f32| {
+        if o > 0.0 {
+            m.next_up()
+        } else if o < 0.0 {
+            m.next_down()
+        } else {
+            m
+        }
+    };
+    Vec3::new(round(moved.x, offset.x), round(moved.y, offset.y), round(moved.z, offset.z))
+}
+
+/// One end of a segment.
+#[derive(Clone, Copy, Debug)]
+pub enum SegmentEnd {
+    /// On a surface.
+    Surface {
+        /// Position.
+        p: Vec3,
+        /// Its error bound.
+        error: f32,
+        /// Geometric normal, either side.
+        ng: Vec3,
+    },
+    /// In space: a point light, a pinhole, a medium.
+    Free(Vec3),
+}
+
+impl SegmentEnd {
+    /// Its position.
+    pub fn position(&self) -> Vec3 {
+        match *self {
+            SegmentEnd::Surface { p, .. } | SegmentEnd::Free(p) => p,
+        }
+    }
+
+    /// Position off the surface, towards `direction`.
+    #[inline]
+    pub fn leaving(&self, direction: Vec3) -> Vec3 {
+        match *self {
+            SegmentEnd::Surface { p, error, ng } => offset_point(p, error, ng, direction),
+            SegmentEnd::Free(p) => p,
+        }
+    }
+}
+
+/// The segment between two points, both moved off their surfaces: the same from either end up to its direction.
+#[inline]
+pub fn segment(a: &SegmentEnd, b: &SegmentEnd) -> Segment {
+    let d = b.position() - a.position();
+    Segment::between(a.leaving(d), b.leaving(-d))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_moved_point_is_on_its_side(scale in prop::sample::select(vec![1e-3f32, 1.0, 1e4]),
+                                          c in prop::array::uniform9(-1.0f32..1.0), u in 0.01f32..0.49, v in 0.01f32..0.49) {
+            let corners = [Vec3::new(c[0], c[1], c[2]) * scale, Vec3::new(c[3], c[4], c[5]) * scale, Vec3::new(c[6], c[7], c[8]) * scale];
+            let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            prop_assume!(n.length() > 1e-2 * scale * scale);
+            let b = [1.0 - u - v, u, v];
+            let p = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
+            let error = barycentric_error(&corners, b);
+            // The plane in double precision decides on which side the moved point is.
+            let (n64, c0) = (((corners[1] - corners[0]).as_dvec3()).cross((corners[2] - corners[0]).as_dvec3()), corners[0].as_dvec3());
+            for side in [1.0f32, -1.0] {
+                let ng = n.normalize();
+                let moved = offset_point(p, error, ng, ng * side);
+                prop_assert!((moved.as_dvec3() - c0).dot(n64) * f64::from(side) > 0.0);
+                prop_assert!((moved - p).length() <= 8.0 * error + 1e-30);
+            }
+        }
+    }
+
+    #[test]
+    fn segments_are_symmetric() {
+        let a = SegmentEnd::Surface { p: Vec3::ZERO, error: 1e-6, ng: Vec3::Z };
+        let b = SegmentEnd::Surface { p: Vec3::new(1.0, 2.0, 3.0), error: 2e-6, ng: Vec3::X };
+        let (ab, ba) = (segment(&a, &b), segment(&b, &a));
+        assert_eq!(ab.d, -ba.d);
+        assert_eq!(ab.o + ab.d, ba.o);
+    }
+}
