@@ -1,0 +1,230 @@
+//! Lights without extent: point, spot, directional.
+
+use super::sample::{DirectSample, EmissionSample, LightEnd};
+use super::{EmitError, in_range};
+use crate::math::warp::{SPHERE_PDF, cone_pdf, square_to_cone, square_to_sphere};
+use crate::math::{AreaPdf, DMat4, DVec3, Frame, Rgb, SolidAnglePdf, Vec3};
+use std::f32::consts::PI;
+
+use super::environment::disk_before_scene;
+
+/// A point that shines equally in all directions.
+#[derive(Clone, Debug)]
+pub struct PointLight {
+    position: Vec3,
+    intensity: Rgb,
+}
+
+/// Direct light from a point: inverse square law.
+fn direct_from_point(position: Vec3, from: Vec3, intensity: impl Fn(Vec3) -> Rgb) -> Option<DirectSample> {
+    let to = position - from;
+    let distance = to.length();
+    if !(distance > 0.0 && distance.is_finite()) {
+        return None;
+    }
+    let wi = to / distance;
+    let radiance = intensity(-wi) / (distance * distance);
+    if radiance.is_black() || !radiance.is_finite() {
+        return None;
+    }
+    Some(DirectSample {
+        wi,
+        distance,
+        end: LightEnd::Point { p: position },
+        radiance,
+        pdf: SolidAnglePdf(1.0),
+        delta: true,
+    })
+}
+
+/// An emission ray from a point.
+fn emission_from_point(position: Vec3, direction: Vec3, radiance: Rgb, pdf: SolidAnglePdf) -> EmissionSample {
+    EmissionSample {
+        origin: position,
+        error: 0.0,
+        ng: None,
+        direction,
+        radiance,
+        pdf_position: AreaPdf(1.0),
+        pdf_direction: pdf,
+        delta_position: true,
+        delta_direction: false,
+        end: LightEnd::Point { p: position },
+    }
+}
+
+impl PointLight {
+    /// At the world position `position`, in a scene whose centre is `centre`; `intensity` in W/sr.
+    pub fn new(position: DVec3, intensity: Rgb, centre: DVec3) -> PointLight {
+        PointLight { position: (position - centre).as_vec3(), intensity }
+    }
+
+    /// Where it is, relative to the scene's centre.
+    pub fn position(&self) -> Vec3 {
+        self.position
+    }
+
+    /// See [`super::Light::power`].
+    pub fn power(&self) -> f32 {
+        4.0 * PI * self.intensity.luminance()
+    }
+
+    /// See [`super::Light::sample_direct`].
+    pub fn sample_direct(&self, from: Vec3) -> Option<DirectSample> {
+        direct_from_point(self.position, from, |_| self.intensity)
+    }
+
+    /// See [`super::Light::sample_emission`].
+    pub fn sample_emission(&self, u_dir: [f32; 2]) -> EmissionSample {
+        emission_from_point(self.position, square_to_sphere(u_dir), self.intensity, self.pdf_direction())
+    }
+
+    /// Density of emission directions per steradian.
+    pub fn pdf_direction(&self) -> SolidAnglePdf {
+        SolidAnglePdf(SPHERE_PDF)
+    }
+}
+
+/// A point that shines into a cone: full strength up to one angle, then falling linearly in the angle to zero (Mitsuba's `spot`).
+#[derive(Clone, Debug)]
+pub struct SpotLight {
+    position: Vec3,
+    frame: Frame,
+    intensity: Rgb,
+    cutoff: f32,
+    beam: f32,
+    cos_cutoff: f32,
+    cos_beam: f32,
+}
+
+impl SpotLight {
+    /// Along +z of the space of `to_world`; half angles in degrees, `beam_width` ≤ `cutoff_angle` < 180.
+    pub fn new(
+        to_world: DMat4,
+        intensity: Rgb,
+        cutoff_angle: f32,
+        beam_width: f32,
+        centre: DVec3,
+    ) -> Result<SpotLight, EmitError> {
+        let cutoff = f64::from(cutoff_angle);
+        in_range("cutoff_angle", cutoff, cutoff > 0.0 && cutoff < 180.0, "between 0 and 180 degrees")?;
+        in_range("beam_width", f64::from(beam_width), beam_width >= 0.0, "at least 0 degrees")?;
+        let position = (to_world.w_axis.truncate() - centre).as_vec3();
+        let axis = to_world.z_axis.truncate().try_normalize().ok_or(EmitError::Transform("spot light"))?.as_vec3();
+        if !position.is_finite() {
+            return Err(EmitError::Transform("spot light"));
+        }
+        let (cutoff, beam) = (cutoff_angle.to_radians(), beam_width.min(cutoff_angle).to_radians());
+        let frame = Frame::from_normal(axis.normalize());
+        Ok(SpotLight { position, frame, intensity, cutoff, beam, cos_cutoff: cutoff.cos(), cos_beam: beam.cos() })
+    }
+
+    /// Where it is, relative to the scene's centre.
+    pub fn position(&self) -> Vec3 {
+        self.position
+    }
+
+    /// Unit direction of its axis.
+    pub fn axis(&self) -> Vec3 {
+        self.frame.n
+    }
+
+    /// Half angle in radians beyond which it is dark.
+    pub fn cutoff(&self) -> f32 {
+        self.cutoff
+    }
+
+    /// Radiant intensity in the unit direction `wo`.
+    pub fn intensity(&self, wo: Vec3) -> Rgb {
+        let cos = self.frame.n.dot(wo);
+        if cos <= self.cos_cutoff {
+            Rgb::BLACK
+        } else if cos >= self.cos_beam {
+            self.intensity
+        } else {
+            self.intensity * ((self.cutoff - cos.min(1.0).acos()) / (self.cutoff - self.beam)).clamp(0.0, 1.0)
+        }
+    }
+
+    /// See [`super::Light::power`].
+    pub fn power(&self) -> f32 {
+        // ∫ I dω in closed form: the full cone, and by parts the ramp ∫ (c − θ) / (c − b) sin θ dθ.
+        let (b, c) = (f64::from(self.beam), f64::from(self.cutoff));
+        let ramp = if c > b { b.cos() - (c.sin() - b.sin()) / (c - b) } else { 0.0 };
+        (2.0 * std::f64::consts::PI * (1.0 - b.cos() + ramp)) as f32 * self.intensity.luminance()
+    }
+
+    /// See [`super::Light::sample_direct`].
+    pub fn sample_direct(&self, from: Vec3) -> Option<DirectSample> {
+        direct_from_point(self.position, from, |wo| self.intensity(wo))
+    }
+
+    /// See [`super::Light::sample_emission`].
+    pub fn sample_emission(&self, u_dir: [f32; 2]) -> EmissionSample {
+        let direction = self.frame.to_world(square_to_cone(u_dir, self.cos_cutoff)).normalize();
+        let pdf = SolidAnglePdf(cone_pdf(self.cos_cutoff));
+        emission_from_point(self.position, direction, self.intensity(direction), pdf)
+    }
+
+    /// Density of emission directions per steradian.
+    pub fn pdf_direction(&self, wo: Vec3) -> SolidAnglePdf {
+        SolidAnglePdf(if self.frame.n.dot(wo) > self.cos_cutoff { cone_pdf(self.cos_cutoff) } else { 0.0 })
+    }
+}
+
+/// Parallel light from beyond the scene.
+#[derive(Clone, Debug)]
+pub struct DirectionalLight {
+    /// Direction of travel.
+    direction: Vec3,
+    irradiance: Rgb,
+    radius: f32,
+}
+
+impl DirectionalLight {
+    /// Travelling in the world direction `direction` through a scene whose bounding sphere around its centre has the radius
+    /// `scene_radius`; `irradiance` in W/m² on a surface that faces it.
+    pub fn new(direction: DVec3, irradiance: Rgb, scene_radius: f32) -> Result<DirectionalLight, EmitError> {
+        let direction = direction.try_normalize().ok_or(EmitError::Transform("directional light"))?;
+        let radius = super::environment::disk_radius(scene_radius);
+        Ok(DirectionalLight { direction: direction.as_vec3().normalize(), irradiance, radius })
+    }
+
+    /// See [`super::Light::power`].
+    pub fn power(&self) -> f32 {
+        PI * self.radius * self.radius * self.irradiance.luminance()
+    }
+
+    /// See [`super::Light::sample_direct`].
+    pub fn sample_direct(&self) -> Option<DirectSample> {
+        (!self.irradiance.is_black()).then_some(DirectSample {
+            wi: -self.direction,
+            distance: f32::INFINITY,
+            end: LightEnd::Infinite,
+            radiance: self.irradiance,
+            pdf: SolidAnglePdf(1.0),
+            delta: true,
+        })
+    }
+
+    /// See [`super::Light::sample_emission`].
+    pub fn sample_emission(&self, u_pos: [f32; 2]) -> EmissionSample {
+        EmissionSample {
+            origin: disk_before_scene(u_pos, self.direction, self.radius),
+            error: 0.0,
+            ng: None,
+            direction: self.direction,
+            radiance: self.irradiance,
+            pdf_position: self.pdf_position(),
+            pdf_direction: SolidAnglePdf(1.0),
+            delta_position: false,
+            delta_direction: true,
+            end: LightEnd::Infinite,
+        }
+    }
+
+    /// Density of emission rays per unit area of the disk.
+    pub fn pdf_position(&self) -> AreaPdf {
+        AreaPdf(1.0 / (PI * self.radius * self.radius))
+    }
+}

@@ -1,0 +1,134 @@
+//! A light of any kind, seen through one set of functions.
+
+use super::delta::{DirectionalLight, PointLight, SpotLight};
+use super::environment::EnvironmentLight;
+use super::sample::{DirectSample, EmissionSample, LightEnd};
+use super::triangle::TriangleLight;
+use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
+
+/// A light.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// An emitting triangle.
+    Triangle(TriangleLight),
+    /// A point that shines in all directions.
+    Point(PointLight),
+    /// A point that shines into a cone.
+    Spot(Box<SpotLight>),
+    /// Parallel light.
+    Directional(DirectionalLight),
+    /// Radiance from all directions.
+    Environment(Box<EnvironmentLight>),
+}
+
+impl Light {
+    /// Samples the light as seen from `from`; `None` if no light can arrive from the sample. The density is for the light alone:
+    /// multiply by the probability of having chosen it.
+    pub fn sample_direct(&self, from: Vec3, u: [f32; 2]) -> Option<DirectSample> {
+        match self {
+            Light::Triangle(l) => l.sample_direct(from, u),
+            Light::Point(l) => l.sample_direct(from),
+            Light::Spot(l) => l.sample_direct(from),
+            Light::Directional(l) => l.sample_direct(),
+            Light::Environment(l) => l.sample_direct(u),
+        }
+    }
+
+    /// Density per steradian with which [`Light::sample_direct`] draws the unit direction `wi`, along which a ray from `from`
+    /// meets the light after `distance` (infinite for lights at infinity). Zero for delta lights.
+    pub fn pdf_direct(&self, from: Vec3, wi: Vec3, distance: f32) -> SolidAnglePdf {
+        match self {
+            Light::Triangle(l) => l.pdf_direct(from, wi, distance),
+            Light::Environment(l) => l.pdf_direct(wi),
+            _ => SolidAnglePdf(0.0),
+        }
+    }
+
+    /// Radiance that leaves the light in the unit direction `wo`; `b` = barycentrics (b1, b2) of the point on a triangle, unused
+    /// by other kinds. Black for delta lights: no ray meets them.
+    pub fn emitted(&self, b: [f32; 2], wo: Vec3) -> Rgb {
+        match self {
+            Light::Triangle(l) => l.emitted(b, wo),
+            Light::Environment(l) => l.radiance(-wo),
+            _ => Rgb::BLACK,
+        }
+    }
+
+    /// Samples a ray that leaves the light.
+    pub fn sample_emission(&self, u_pos: [f32; 2], u_dir: [f32; 2]) -> Option<EmissionSample> {
+        match self {
+            Light::Triangle(l) => l.sample_emission(u_pos, u_dir),
+            Light::Point(l) => Some(l.sample_emission(u_dir)),
+            Light::Spot(l) => Some(l.sample_emission(u_dir)),
+            Light::Directional(l) => Some(l.sample_emission(u_pos)),
+            Light::Environment(l) => l.sample_emission(u_pos, u_dir),
+        }
+    }
+
+    /// Densities with which [`Light::sample_emission`] draws a ray in the unit direction `wo`: of its origin (per unit area, any
+    /// point of the light or of the disk) and of its direction (per steradian). A delta factor is zero: no ray found in another
+    /// way has that exact position or direction.
+    pub fn pdf_emission(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
+        match self {
+            Light::Triangle(l) => l.pdf_emission(wo),
+            Light::Point(l) => (AreaPdf(0.0), l.pdf_direction()),
+            Light::Spot(l) => (AreaPdf(0.0), l.pdf_direction(wo)),
+            Light::Directional(l) => (l.pdf_position(), SolidAnglePdf(0.0)),
+            Light::Environment(l) => l.pdf_emission(wo),
+        }
+    }
+
+    /// Densities of the emission ray in the direction `wo` for a light vertex that was drawn by [`Light::sample_direct`]: as
+    /// [`Light::pdf_emission`], but a delta factor counts as 1, which is what a weight needs when the vertex is on the delta
+    /// light by construction.
+    pub fn pdf_emission_given_vertex(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
+        match self {
+            Light::Point(l) => (AreaPdf(1.0), l.pdf_direction()),
+            Light::Spot(l) => (AreaPdf(1.0), l.pdf_direction(wo)),
+            Light::Directional(l) => (l.pdf_position(), SolidAnglePdf(1.0)),
+            _ => self.pdf_emission(wo),
+        }
+    }
+
+    /// Luminance of the emitted flux: the weight of the light when one is chosen. Positive wherever light is emitted.
+    pub fn power(&self) -> f32 {
+        match self {
+            Light::Triangle(l) => l.power(),
+            Light::Point(l) => l.power(),
+            Light::Spot(l) => l.power(),
+            Light::Directional(l) => l.power(),
+            Light::Environment(l) => l.power(),
+        }
+    }
+
+    /// The light is beyond the scene; rays that escape may see it.
+    pub fn is_infinite(&self) -> bool {
+        matches!(self, Light::Directional(_) | Light::Environment(_))
+    }
+
+    /// No ray meets the light by chance.
+    pub fn is_delta(&self) -> bool {
+        self.delta_position() || self.delta_direction()
+    }
+
+    /// The light is a point in space.
+    pub fn delta_position(&self) -> bool {
+        matches!(self, Light::Point(_) | Light::Spot(_))
+    }
+
+    /// The light has one direction.
+    pub fn delta_direction(&self) -> bool {
+        matches!(self, Light::Directional(_))
+    }
+
+    /// The light end of a segment for a ray that met the light at `p` (any value for lights at infinity), with the error bound
+    /// that the caller knows for its hit.
+    pub fn end_at(&self, p: Vec3, error: f32) -> LightEnd {
+        match self {
+            Light::Triangle(l) => LightEnd::Surface { p, error, ng: l.ng() },
+            Light::Point(l) => LightEnd::Point { p: l.position() },
+            Light::Spot(l) => LightEnd::Point { p: l.position() },
+            Light::Directional(_) | Light::Environment(_) => LightEnd::Infinite,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! What sampling a light returns, and the conventions for lights at infinity.
+//!
+//! A light at infinity has no points. By convention its path vertex y_0 carries a direction; the vertex's "area density" is the
+//! density per steradian of that direction, its geometry term with the next vertex has neither 1/d² nor a cosine at the light,
+//! and the next vertex's area density comes from the disk that emission rays start on. The functions of [`LightEnd`] apply
+//! these rules, so that callers write one formula for all lights.
+
+use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
+
+/// Where the light end of a segment is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightEnd {
+    /// A point of an emitting surface.
+    Surface {
+        /// Position.
+        p: Vec3,
+        /// Bound on the error of any component of `p`.
+        error: f32,
+        /// Unit geometric normal, on the side that emits.
+        ng: Vec3,
+    },
+    /// A light without extent.
+    Point {
+        /// Position.
+        p: Vec3,
+    },
+    /// Beyond the scene.
+    Infinite,
+}
+
+impl LightEnd {
+    /// Area density of the light vertex itself: `position` for a light in the scene, `direction` for one at infinity.
+    pub fn vertex_density(&self, position: AreaPdf, direction: SolidAnglePdf) -> AreaPdf {
+        match self {
+            LightEnd::Infinite => AreaPdf(direction.0),
+            _ => position,
+        }
+    }
+
+    /// Area density of the vertex that follows the light vertex on an emission ray; `cos_next` is the cosine at that vertex
+    /// between its normal and the segment, `dist2` the segment's squared length (unused at infinity).
+    pub fn next_density(&self, position: AreaPdf, direction: SolidAnglePdf, cos_next: f32, dist2: f32) -> AreaPdf {
+        match self {
+            // The disk is perpendicular to the ray: only the receiver's tilt spreads its density.
+            LightEnd::Infinite => AreaPdf(position.0 * cos_next.abs()),
+            _ => direction.to_area(cos_next, dist2),
+        }
+    }
+
+    /// Geometry term of the segment from the light vertex to a vertex whose cosine with it is `cos_next`; `wo` is the unit
+    /// direction leaving the light.
+    pub fn geometry(&self, wo: Vec3, cos_next: f32, dist2: f32) -> f32 {
+        match *self {
+            LightEnd::Surface { ng, .. } => ng.dot(wo).abs() * cos_next.abs() / dist2,
+            LightEnd::Point { .. } => cos_next.abs() / dist2,
+            LightEnd::Infinite => cos_next.abs(),
+        }
+    }
+}
+
+/// Light arriving at a reference point from one sampled point (or direction) of one light.
+#[derive(Clone, Copy, Debug)]
+pub struct DirectSample {
+    /// Unit direction from the reference point to the light.
+    pub wi: Vec3,
+    /// Length of the segment; infinite for a light at infinity.
+    pub distance: f32,
+    /// The segment's end at the light.
+    pub end: LightEnd,
+    /// Emitted radiance towards the reference point. Of a point or spot light: intensity / distance². Of a directional light:
+    /// irradiance on a surface that faces it. In all cases `radiance / pdf` times BSDF and cosine estimates reflected radiance.
+    pub radiance: Rgb,
+    /// Density per steradian at the reference point; 1 for delta lights. The choice of the light is not part of it.
+    pub pdf: SolidAnglePdf,
+    /// The light has no extent: no ray hits it by chance.
+    pub delta: bool,
+}
+
+/// A ray that leaves a light.
+#[derive(Clone, Copy, Debug)]
+pub struct EmissionSample {
+    /// Where the ray starts. For lights at infinity: a point of the disk before the scene.
+    pub origin: Vec3,
+    /// Bound on the error of any component of `origin`.
+    pub error: f32,
+    /// Unit normal of the surface it leaves, if there is one.
+    pub ng: Option<Vec3>,
+    /// Unit direction of travel.
+    pub direction: Vec3,
+    /// Emitted radiance; of a point or spot light its intensity, of a directional light its irradiance.
+    pub radiance: Rgb,
+    /// Density of `origin` per unit area: of the surface, or of the disk perpendicular to `direction` for lights at infinity; 1 for
+    /// a light at a point.
+    pub pdf_position: AreaPdf,
+    /// Density of `direction` per steradian; 1 for a directional light.
+    pub pdf_direction: SolidAnglePdf,
+    /// The light is a point.
+    pub delta_position: bool,
+    /// The light has one direction.
+    pub delta_direction: bool,
+    /// The light end of a segment along this ray.
+    pub end: LightEnd,
+}
+
+impl EmissionSample {
+    /// Flux carried: radiance · |cos θ at the light| / density. Its expectation is the light's flux per channel.
+    pub fn flux(&self) -> Rgb {
+        let cos = self.ng.map_or(1.0, |n| n.dot(self.direction).abs());
+        self.radiance * (cos / (self.pdf_position.0 * self.pdf_direction.0))
+    }
+
+    /// Area density of the light vertex (see [`LightEnd::vertex_density`]).
+    pub fn vertex_density(&self) -> AreaPdf {
+        self.end.vertex_density(self.pdf_position, self.pdf_direction)
+    }
+}

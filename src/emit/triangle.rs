@@ -1,0 +1,195 @@
+//! An emitting triangle.
+
+use super::sample::{DirectSample, EmissionSample, LightEnd};
+use crate::math::float::gamma;
+use crate::math::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere, square_to_triangle};
+use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec2, Vec3};
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+/// A picture of radiance over texture space.
+pub trait RadianceTexture: std::fmt::Debug + Send + Sync {
+    /// Radiance at the texture coordinates `uv`.
+    fn at(&self, uv: Vec2) -> Rgb;
+    /// Mean over the whole texture. It must not be black unless the texture is black everywhere.
+    fn mean(&self) -> Rgb;
+}
+
+/// What a triangle emits from its front.
+#[derive(Clone, Debug)]
+pub enum TriangleEmission {
+    /// The same radiance everywhere.
+    Constant(Rgb),
+    /// Looked up.
+    Textured(Box<TexturedEmission>),
+}
+
+/// Radiance from a texture.
+#[derive(Clone, Debug)]
+pub struct TexturedEmission {
+    /// The texture.
+    pub texture: Arc<dyn RadianceTexture>,
+    /// Texture coordinates of the corners.
+    pub uv: [Vec2; 3],
+}
+
+/// A triangle in the world (relative to the scene's centre) that emits on the side of its normal.
+#[derive(Clone, Debug)]
+pub struct TriangleLight {
+    v: [Vec3; 3],
+    ng: Vec3,
+    area: f32,
+    power: f32,
+    emission: TriangleEmission,
+}
+
+/// Points per edge of the grid on which a textured triangle's mean radiance is taken.
+const POWER_GRID: u32 = 8;
+/// Part of its texture's mean that a textured triangle is credited with at least: the grid may miss its bright texels, but the
+/// triangle must keep a probability.
+const POWER_FLOOR: f32 = 0.01;
+
+impl TriangleLight {
+    /// From corners in counter-clockwise order as seen from the emitting side; `flip` makes the other side emit. A triangle
+    /// without area never emits.
+    pub fn new(v: [Vec3; 3], flip: bool, emission: TriangleEmission) -> TriangleLight {
+        let d = |i: usize| v[i].as_dvec3();
+        let cross = (d(1) - d(0)).cross(d(2) - d(0)) * if flip { -1.0 } else { 1.0 };
+        let length = cross.length();
+        let ok = length.is_finite() && length > 0.0;
+        let (ng, area) = if ok { ((cross / length).as_vec3(), (0.5 * length) as f32) } else { (Vec3::Z, 0.0) };
+        let mut light = TriangleLight { v, ng, area, power: 0.0, emission };
+        let power = PI * area * light.mean_radiance().luminance();
+        light.power = if power.is_finite() { power.max(0.0) } else { 0.0 };
+        light
+    }
+
+    fn mean_radiance(&self) -> Rgb {
+        match &self.emission {
+            TriangleEmission::Constant(radiance) => *radiance,
+            TriangleEmission::Textured(t) => {
+                let n = POWER_GRID;
+                let at = |i: u32| ((i % n) as f32 + 0.5, (i / n) as f32 + 0.5);
+                let sum: Rgb = (0..n * n)
+                    .map(|i| self.radiance(square_to_triangle([at(i).0 / n as f32, at(i).1 / n as f32])))
+                    .sum();
+                let mean = sum / (n * n) as f32;
+                let floor = t.texture.mean() * POWER_FLOOR;
+                if mean.luminance() > floor.luminance() { mean } else { floor }
+            }
+        }
+    }
+
+    /// Corners.
+    pub fn corners(&self) -> [Vec3; 3] {
+        self.v
+    }
+
+    /// Unit normal on the side that emits.
+    pub fn ng(&self) -> Vec3 {
+        self.ng
+    }
+
+    /// Area.
+    pub fn area(&self) -> f32 {
+        self.area
+    }
+
+    /// Luminance of the flux: π · area · mean radiance.
+    pub fn power(&self) -> f32 {
+        self.power
+    }
+
+    /// Radiance at the barycentrics (b1, b2).
+    fn radiance(&self, b: [f32; 2]) -> Rgb {
+        match &self.emission {
+            TriangleEmission::Constant(radiance) => *radiance,
+            TriangleEmission::Textured(t) => {
+                let [a, b1, b2] = [1.0 - b[0] - b[1], b[0], b[1]];
+                t.texture.at(t.uv[0] * a + t.uv[1] * b1 + t.uv[2] * b2)
+            }
+        }
+    }
+
+    /// Radiance at the barycentrics `b` = (b1, b2) in the unit direction `wo`; black behind.
+    pub fn emitted(&self, b: [f32; 2], wo: Vec3) -> Rgb {
+        if self.ng.dot(wo) > 0.0 { self.radiance(b) } else { Rgb::BLACK }
+    }
+
+    /// The point at the barycentrics (b1, b2), and the bound γ₇ · Σ|bᵢ vᵢ| on the error of its components.
+    fn point(&self, b: [f32; 2]) -> (Vec3, f32) {
+        let terms = [self.v[0] * (1.0 - b[0] - b[1]), self.v[1] * b[0], self.v[2] * b[1]];
+        let bound = (terms[0].abs() + terms[1].abs() + terms[2].abs()).max_element();
+        (terms[0] + terms[1] + terms[2], gamma(7) * bound)
+    }
+
+    /// See [`super::Light::sample_direct`].
+    pub fn sample_direct(&self, from: Vec3, u: [f32; 2]) -> Option<DirectSample> {
+        if self.area <= 0.0 || self.ng.dot(from - self.v[0]) <= 0.0 {
+            return None;
+        }
+        let b = square_to_triangle(u);
+        let (p, error) = self.point(b);
+        let to = p - from;
+        let distance = to.length();
+        let wi = to / distance;
+        let pdf = self.pdf_direct(from, wi, distance);
+        let radiance = self.emitted(b, -wi);
+        if !(pdf.0 > 0.0 && pdf.0.is_finite()) || radiance.is_black() {
+            return None;
+        }
+        Some(DirectSample {
+            wi,
+            distance,
+            end: LightEnd::Surface { p, error, ng: self.ng },
+            radiance,
+            pdf,
+            delta: false,
+        })
+    }
+
+    /// See [`super::Light::pdf_direct`].
+    pub fn pdf_direct(&self, _from: Vec3, wi: Vec3, distance: f32) -> SolidAnglePdf {
+        let cos = -self.ng.dot(wi);
+        if self.area <= 0.0 || cos <= 0.0 {
+            return SolidAnglePdf(0.0);
+        }
+        AreaPdf(1.0 / self.area).to_solid_angle(cos, distance * distance)
+    }
+
+    /// See [`super::Light::sample_emission`].
+    pub fn sample_emission(&self, u_pos: [f32; 2], u_dir: [f32; 2]) -> Option<EmissionSample> {
+        if self.area <= 0.0 {
+            return None;
+        }
+        let b = square_to_triangle(u_pos);
+        let radiance = self.radiance(b);
+        let local = square_to_cosine_hemisphere(u_dir);
+        if radiance.is_black() || local.z <= 0.0 {
+            return None;
+        }
+        let (origin, error) = self.point(b);
+        let direction = Frame::from_normal(self.ng).to_world(local).normalize();
+        let (pdf_position, pdf_direction) = self.pdf_emission(direction);
+        (pdf_direction.0 > 0.0).then_some(EmissionSample {
+            origin,
+            error,
+            ng: Some(self.ng),
+            direction,
+            radiance,
+            pdf_position,
+            pdf_direction,
+            delta_position: false,
+            delta_direction: false,
+            end: LightEnd::Surface { p: origin, error, ng: self.ng },
+        })
+    }
+
+    /// See [`super::Light::pdf_emission`].
+    pub fn pdf_emission(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
+        if self.area <= 0.0 {
+            return (AreaPdf(0.0), SolidAnglePdf(0.0));
+        }
+        (AreaPdf(1.0 / self.area), SolidAnglePdf(cosine_hemisphere_pdf(self.ng.dot(wo))))
+    }
+}

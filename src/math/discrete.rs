@@ -1,0 +1,182 @@
+//! Distributions over finitely many choices.
+
+use super::float::ONE_MINUS_EPSILON;
+use super::measure::Pmf;
+
+/// Constant-time choice with given probabilities (Walker 1974; built by Vose's method, 1991).
+///
+/// One random number serves for both the column and the coin. A float has 24 random bits, so with n entries a probability is
+/// met to about n·2^-24: good to four digits up to a thousand entries, to one percent up to some hundred thousand.
+#[derive(Clone, Debug, Default)]
+pub struct AliasTable {
+    columns: Vec<Column>,
+    pmf: Vec<f32>,
+    total: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Column {
+    /// Chance to stay in the column.
+    threshold: f32,
+    /// Where to go otherwise.
+    alias: u32,
+}
+
+impl AliasTable {
+    /// A table for `weights`; negative, NaN and infinite weights count as zero.
+    pub fn new(weights: &[f32]) -> AliasTable {
+        let clean = |w: f32| if w.is_finite() && w > 0.0 { f64::from(w) } else { 0.0 };
+        let total: f64 = weights.iter().map(|&w| clean(w)).sum();
+        if total <= 0.0 {
+            return AliasTable { columns: Vec::new(), pmf: vec![0.0; weights.len()], total: 0.0 };
+        }
+        let n = weights.len();
+        let mut scaled: Vec<f64> = weights.iter().map(|&w| clean(w) / total * n as f64).collect();
+        let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| scaled[i] < 1.0);
+        let heaviest = (0..n).max_by(|&a, &b| scaled[a].total_cmp(&scaled[b])).unwrap_or(0);
+        let mut columns: Vec<Column> = (0..n).map(|i| Column { threshold: 1.0, alias: i as u32 }).collect();
+        while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
+            small.pop();
+            columns[s] = Column { threshold: scaled[s] as f32, alias: l as u32 };
+            scaled[l] -= 1.0 - scaled[s];
+            if scaled[l] < 1.0 {
+                large.pop();
+                small.push(l);
+            }
+        }
+        // Rounding can leave columns that should hold exactly one. An impossible entry among them must stay impossible.
+        for &s in small.iter().filter(|&&s| clean(weights[s]) == 0.0) {
+            columns[s] = Column { threshold: 0.0, alias: heaviest as u32 };
+        }
+        let pmf = weights.iter().map(|&w| (clean(w) / total) as f32).collect();
+        AliasTable { columns, pmf, total }
+    }
+
+    /// Number of choices, impossible ones included.
+    pub fn len(&self) -> usize {
+        self.pmf.len()
+    }
+
+    /// True if there is nothing to choose.
+    pub fn is_empty(&self) -> bool {
+        self.pmf.is_empty()
+    }
+
+    /// Sum of the weights.
+    pub fn total(&self) -> f64 {
+        self.total
+    }
+
+    /// A choice for `u` in [0, 1) and its probability; `None` if all weights are zero.
+    pub fn sample(&self, u: f32) -> Option<(usize, Pmf)> {
+        if self.columns.is_empty() {
+            return None;
+        }
+        // In double precision: the product must not round up to the next column.
+        let x = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON)) * self.columns.len() as f64;
+        let i = x as usize;
+        let column = self.columns[i];
+        let chosen = if ((x - i as f64) as f32) < column.threshold { i } else { column.alias as usize };
+        Some((chosen, Pmf(self.pmf[chosen])))
+    }
+
+    /// Probability of choice `i`; zero outside.
+    pub fn pmf(&self, i: usize) -> Pmf {
+        Pmf(self.pmf.get(i).copied().unwrap_or(0.0))
+    }
+}
+
+/// Choice by a cumulative sum: logarithmic time, but monotone in the random number, so stratified numbers give stratified
+/// choices, and the number can be used again.
+#[derive(Clone, Debug, Default)]
+pub struct Cdf {
+    /// cdf[i] is the probability of a choice below i + 1; the last is 1.
+    cdf: Vec<f64>,
+    total: f64,
+}
+
+impl Cdf {
+    /// For `weights`; negative, NaN and infinite weights count as zero.
+    pub fn new(weights: &[f32]) -> Cdf {
+        let mut sum = 0.0;
+        let mut cdf: Vec<f64> = weights
+            .iter()
+            .map(|&w| {
+                sum += if w.is_finite() && w > 0.0 { f64::from(w) } else { 0.0 };
+                sum
+            })
+            .collect();
+        if sum > 0.0 {
+            cdf.iter_mut().for_each(|c| *c /= sum);
+        }
+        Cdf { cdf, total: sum }
+    }
+
+    /// Sum of the weights.
+    pub fn total(&self) -> f64 {
+        self.total
+    }
+
+    /// A choice for `u` in [0, 1), its probability, and a new number in [0, 1); `None` if all weights are zero.
+    pub fn sample(&self, u: f32) -> Option<(usize, Pmf, f32)> {
+        if self.total <= 0.0 {
+            return None;
+        }
+        let u = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON));
+        let i = self.cdf.partition_point(|&c| c <= u).min(self.cdf.len() - 1);
+        let below = if i == 0 { 0.0 } else { self.cdf[i - 1] };
+        let p = self.cdf[i] - below;
+        Some((i, Pmf(p as f32), (((u - below) / p) as f32).clamp(0.0, ONE_MINUS_EPSILON)))
+    }
+
+    /// Probability of choice `i`; zero outside.
+    pub fn pmf(&self, i: usize) -> Pmf {
+        match self.cdf.get(i) {
+            Some(&c) if self.total > 0.0 => Pmf((c - if i == 0 { 0.0 } else { self.cdf[i - 1] }) as f32),
+            _ => Pmf(0.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// On a regular grid the share of each choice is its probability up to the grid's resolution.
+        #[test]
+        fn frequencies_are_the_probabilities(weights in prop::collection::vec(prop_oneof![Just(0.0f32), 0.0f32..10.0], 1..20)) {
+            let (alias, cdf) = (AliasTable::new(&weights), Cdf::new(&weights));
+            let total: f32 = weights.iter().sum();
+            prop_assume!(total > 0.0);
+            let n = 20_000;
+            let mut count = vec![[0u32; 2]; weights.len()];
+            for k in 0..n {
+                let u = (k as f32 + 0.5) / n as f32;
+                let (i, p) = alias.sample(u).unwrap();
+                count[i][0] += 1;
+                prop_assert!((p.0 - weights[i] / total).abs() < 1e-6);
+                let (j, q, rest) = cdf.sample(u).unwrap();
+                count[j][1] += 1;
+                prop_assert!((q.0 - weights[j] / total).abs() < 1e-6 && (0.0..1.0).contains(&rest));
+            }
+            for (i, &w) in weights.iter().enumerate() {
+                prop_assert_eq!(alias.pmf(i).0 == 0.0, w == 0.0);
+                for c in count[i] {
+                    prop_assert!((c as f32 / n as f32 - w / total).abs() < 40.0 / n as f32);
+                    prop_assert!(w > 0.0 || c == 0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn hopeless_weights_give_nothing() {
+        for weights in [vec![], vec![0.0], vec![f32::NAN, -1.0, f32::INFINITY]] {
+            assert!(AliasTable::new(&weights).sample(0.3).is_none());
+            assert!(Cdf::new(&weights).sample(0.3).is_none());
+            assert_eq!(AliasTable::new(&weights).pmf(0), Pmf(0.0));
+        }
+    }
+}
