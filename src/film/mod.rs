@@ -1,1 +1,148 @@
-//! Pixel sums and their output.
+//! Pixel sums and the guard at their door.
+//!
+//! The film is cut into tiles that one worker owns at a time, so nothing is locked, nothing is summed in an order that depends on
+//! the number of threads, and the sums are double precision. Nothing that is not finite is ever added: it is counted, and
+//! where it came from is kept.
+
+pub mod tile;
+
+pub use tile::{FilmTile, SampleBuffer};
+
+use crate::math::Rgb;
+
+/// Pixels along a tile's side.
+pub const TILE: u32 = 16;
+/// Places of non-finite samples that are kept; the count goes on.
+const KEPT_PLACES: usize = 16;
+
+/// A sample that was not a finite number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct NonFinite {
+    /// Column of the full picture.
+    pub x: u32,
+    /// Row of the full picture.
+    pub y: u32,
+    /// Iteration.
+    pub iteration: u64,
+}
+
+/// The part of the picture that is rendered, with its sums.
+#[derive(Clone, Debug)]
+pub struct Film {
+    /// Left edge, in pixels of the full picture.
+    pub x0: u32,
+    /// Upper edge, in pixels of the full picture.
+    pub y0: u32,
+    /// Width of the rendered part.
+    pub width: u32,
+    /// Height of the rendered part.
+    pub height: u32,
+    /// Tiles, row by row.
+    pub tiles: Vec<FilmTile>,
+    /// Iterations summed.
+    pub iterations: u64,
+}
+
+impl Film {
+    /// An empty film for a part of the picture: x, y, width, height.
+    pub fn new([x0, y0, width, height]: [u32; 4]) -> Film {
+        let mut tiles = Vec::new();
+        for y in (0..height).step_by(TILE as usize) {
+            for x in (0..width).step_by(TILE as usize) {
+                tiles.push(FilmTile::new(x0 + x, y0 + y, TILE.min(width - x), TILE.min(height - y)));
+            }
+        }
+        Film { x0, y0, width, height, tiles, iterations: 0 }
+    }
+
+    /// Calls `f(x, y, sum, sum of squares)` for every pixel; x and y count from the rendered part's corner.
+    pub fn for_each_pixel(&self, mut f: impl FnMut(u32, u32, [f64; 3], [f64; 3])) {
+        for tile in &self.tiles {
+            for (i, (sum, squares)) in tile.sums.iter().zip(&tile.squares).enumerate() {
+                let i = i as u32;
+                f(tile.x0 - self.x0 + i % tile.width, tile.y0 - self.y0 + i / tile.width, *sum, *squares);
+            }
+        }
+    }
+
+    /// The picture: mean radiance per pixel, row by row.
+    pub fn mean(&self) -> Vec<Rgb> {
+        let mut out = vec![Rgb::BLACK; self.width as usize * self.height as usize];
+        let scale = 1.0 / self.iterations.max(1) as f64;
+        self.for_each_pixel(|x, y, sum, _| {
+            out[(y * self.width + x) as usize] = Rgb::from(sum.map(|s| (s * scale) as f32));
+        });
+        out
+    }
+
+    /// Variance of each pixel's mean, estimated from its samples; zero before the second iteration.
+    pub fn variance_of_mean(&self) -> Vec<Rgb> {
+        let mut out = vec![Rgb::BLACK; self.width as usize * self.height as usize];
+        let n = self.iterations as f64;
+        if self.iterations < 2 {
+            return out;
+        }
+        self.for_each_pixel(|x, y, sum, squares| {
+            let variance: [f32; 3] =
+                std::array::from_fn(|c| (((squares[c] - sum[c] * sum[c] / n) / (n - 1.0)).max(0.0) / n) as f32);
+            out[(y * self.width + x) as usize] = Rgb::from(variance);
+        });
+        out
+    }
+
+    /// How many samples were not finite, and where the first of them were.
+    pub fn non_finite(&self) -> (u64, Vec<NonFinite>) {
+        let count = self.tiles.iter().map(|t| t.non_finite).sum();
+        let mut places: Vec<NonFinite> = self.tiles.iter().flat_map(|t| t.places.iter().copied()).collect();
+        places.sort_by_key(|p| (p.iteration, p.y, p.x));
+        places.truncate(KEPT_PLACES);
+        (count, places)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        let mut film = Film::new([5, 7, 37, 21]);
+        let mut buffer = SampleBuffer::default();
+        for tile in &mut film.tiles {
+            buffer.clear(tile);
+            for i in 0..tile.pixels() {
+                let (x, y) = tile.pixel(i);
+                buffer.add(i, Rgb::new(x as f32, y as f32, 1.0));
+            }
+            tile.commit(&buffer, 0);
+        }
+        film.iterations = 1;
+        let mean = film.mean();
+        for y in 0..21 {
+            for x in 0..37 {
+                assert_eq!(mean[y * 37 + x].to_array(), [x as f32 + 5.0, y as f32 + 7.0, 1.0]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_counted_located_and_left_out() {
+        let mut film = Film::new([0, 0, 4, 4]);
+        let mut buffer = SampleBuffer::default();
+        for iteration in 0..2 {
+            let tile = &mut film.tiles[0];
+            buffer.clear(tile);
+            for i in 0..16 {
+                buffer.add(i, Rgb::WHITE);
+            }
+            if iteration == 1 {
+                buffer.add(6, Rgb::new(0.0, f32::NAN, 0.0));
+            }
+            tile.commit(&buffer, iteration);
+        }
+        film.iterations = 2;
+        assert_eq!(film.non_finite(), (1, vec![NonFinite { x: 2, y: 1, iteration: 1 }]));
+        assert_eq!(film.mean()[0], Rgb::WHITE);
+        assert_eq!(film.mean()[6], Rgb::grey(0.5));
+    }
+}

@@ -1,1 +1,56 @@
 //! Rendering algorithms: one folder and one registry line each.
+//!
+//! Parameters, help texts, refusals and the tests that run over every integrator come from [`REGISTRY`], never from a second list.
+
+pub mod params;
+pub mod path;
+
+pub use params::{ParamDefault, ParamError, ParamSpec, Params};
+
+use crate::film::Film;
+use crate::prepared::{Features, PreparedScene};
+use crate::ray::RayStats;
+
+/// Every integrator, by name.
+pub static REGISTRY: &[&IntegratorSpec] = &[&path::SPEC];
+
+/// What the registry knows of an integrator.
+pub struct IntegratorSpec {
+    /// Name on the command line and in scene files.
+    pub name: &'static str,
+    /// Other names that scene files use for it.
+    pub aliases: &'static [&'static str],
+    /// One sentence.
+    pub about: &'static str,
+    /// Parameters.
+    pub params: &'static [ParamSpec],
+    /// Its expectation is the rendering equation's solution.
+    pub unbiased: bool,
+    /// Why it cannot render a scene with these features, if it cannot.
+    pub refuses: fn(Features) -> Option<String>,
+    /// Builds it.
+    pub build: fn(&Params) -> Box<dyn Integrator>,
+}
+
+/// The integrator of that name or alias.
+pub fn find(name: &str) -> Option<&'static IntegratorSpec> {
+    REGISTRY.iter().find(|s| s.name == name || s.aliases.contains(&name)).copied()
+}
+
+/// One iteration's orders.
+#[derive(Clone, Copy)]
+pub struct Iteration<'a> {
+    /// The scene.
+    pub scene: &'a PreparedScene,
+    /// Seed of the render.
+    pub seed: u64,
+    /// Number of the iteration, from zero.
+    pub index: u64,
+}
+
+/// A rendering algorithm at work.
+pub trait Integrator: Send {
+    /// Adds one sample per pixel to the film, in parallel on the current thread pool; the result must not depend on the
+    /// number of threads.
+    fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats;
+}

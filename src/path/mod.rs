@@ -1,1 +1,11 @@
-//! Vertices, sub-paths and the one random walk.
+//! Paths: vertices, the one random walk, and shadow rays on their way.
+//!
+//! Integrators never write a bounce loop: they give [`walk`] an origin and hooks.
+
+pub mod shadow;
+pub mod vertex;
+pub mod walk;
+
+pub use shadow::ShadowQueue;
+pub use vertex::{Edge, SurfaceVertex};
+pub use walk::{Limits, WalkHooks, WalkStart, walk};

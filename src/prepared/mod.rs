@@ -1,1 +1,121 @@
-//! SceneDesc to PreparedScene: immutable, Sync, in world space.
+//! `SceneDesc` → [`PreparedScene`]: immutable, shared by all threads, in world space around the scene's centre.
+//!
+//! Preparing ([`build`]) places and cleans the triangles, moves everything so that the scene's centre is the origin (in double
+//! precision: far from the origin no single precision policy works), builds materials, lights and the ray-query backend, and
+//! notes which [`features`] the scene has, so that nobody pays for what it lacks.
+
+pub mod build;
+pub mod features;
+pub mod mesh;
+
+pub use build::{PrepareError, PrepareOptions};
+pub use features::Features;
+pub use mesh::MeshShading;
+
+use crate::emit::{Camera, LightId, LightSet, PixelFilter};
+use crate::math::{DVec3, Frame, Rgb, Vec2, Vec3};
+use crate::ray::{Geometry, Hit, NONE, RayQuery, offset::barycentric_error};
+use crate::shade::{Material, MaterialSet, SurfacePoint};
+use glam::{Affine3A, Mat3A};
+use std::sync::Arc;
+
+/// A scene ready to render.
+pub struct PreparedScene {
+    /// Triangles.
+    pub geometry: Arc<Geometry>,
+    /// Who answers questions about rays.
+    pub query: Box<dyn RayQuery>,
+    /// What shading needs of each mesh of `geometry`.
+    pub meshes: Vec<MeshShading>,
+    /// Inverse transposes of the instances' maps.
+    pub instance_normals: Vec<Mat3A>,
+    /// Materials.
+    pub materials: MaterialSet,
+    /// Lights.
+    pub lights: LightSet,
+    /// Camera.
+    pub camera: Camera,
+    /// Pixel filter.
+    pub filter: PixelFilter,
+    /// Width and height of the full picture in pixels.
+    pub film_size: [u32; 2],
+    /// The part to render, in pixels of the full picture: x, y, width, height.
+    pub window: [u32; 4],
+    /// The world position that is the origin here.
+    pub centre: DVec3,
+    /// Radius of a sphere around the origin that holds every triangle.
+    pub radius: f32,
+    /// What the scene has.
+    pub features: Features,
+    /// Seconds that the backend's tree took.
+    pub tree_seconds: f64,
+}
+
+impl PreparedScene {
+    /// Everything that shading needs of a hit.
+    #[inline]
+    pub fn surface_point(&self, hit: &Hit) -> (SurfacePoint, &Material) {
+        let mesh = &self.meshes[hit.mesh as usize];
+        let buffers = &self.geometry.meshes[hit.mesh as usize];
+        let indices = buffers.triangles[hit.triangle as usize].map(|i| i as usize);
+        let corners = indices.map(|i| buffers.positions[i]);
+        let b = [1.0 - hit.u - hit.v, hit.u, hit.v];
+        let e1 = corners[1] - corners[0];
+        let e2 = corners[2] - corners[0];
+        let ng = e1.cross(e2).normalize();
+
+        let mut point = SurfacePoint {
+            p: corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2],
+            error: barycentric_error(&corners, b),
+            ng,
+            frame: Frame { s: Vec3::X, t: Vec3::Y, n: ng },
+            uv: Vec2::new(hit.u, hit.v),
+            dpdu: e1,
+            dpdv: e2,
+            color: Rgb::WHITE,
+        };
+        if mesh.is_plain() {
+            if hit.instance != NONE {
+                self.place(&mut point, hit.instance);
+            }
+            point.frame = Frame::from_normal(point.frame.n);
+        } else {
+            mesh.interpolate(&indices, b, [e1, e2], &mut point);
+            if hit.instance != NONE {
+                self.place(&mut point, hit.instance);
+            }
+            point.frame = if mesh.wants_tangents {
+                Frame::from_normal_tangent(point.frame.n, point.dpdu)
+            } else {
+                Frame::from_normal(point.frame.n)
+            };
+        }
+        (point, self.materials.get(mesh.material))
+    }
+
+    /// From group space to the world; `frame.n` carries the shading normal.
+    #[cold]
+    fn place(&self, point: &mut SurfacePoint, instance: u32) {
+        let m: &Affine3A = &self.geometry.instances[instance as usize].to_world;
+        let normals = &self.instance_normals[instance as usize];
+        // The bound grows with the map's absolute values, and the map itself rounds; the backend rounds the ray into group space as
+        // well, which the last factor covers.
+        let linear = m.matrix3;
+        let absolute =
+            Mat3A::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs()) * point.p.abs();
+        let gain = (linear.x_axis.abs() + linear.y_axis.abs() + linear.z_axis.abs()).max_element();
+        let rounding = crate::math::float::gamma(6) * (Vec3::from(absolute) + Vec3::from(m.translation).abs()).max_element();
+        point.error = 2.0 * (gain * point.error + rounding);
+        point.p = m.transform_point3(point.p);
+        point.ng = (*normals * point.ng).normalize();
+        point.frame.n = (*normals * point.frame.n).normalize();
+        point.dpdu = m.transform_vector3(point.dpdu);
+        point.dpdv = m.transform_vector3(point.dpdv);
+    }
+
+    /// The light that the surface hit belongs to.
+    #[inline]
+    pub fn light_of(&self, hit: &Hit) -> Option<LightId> {
+        self.meshes[hit.mesh as usize].first_light.map(|first| LightId(first + hit.triangle))
+    }
+}

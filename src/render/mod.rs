@@ -1,1 +1,12 @@
-//! The driver: iterations until a budget is used up.
+//! The driver: iterations until a budget is used up, with statistics, checkpoints and output.
+
+pub mod aov;
+pub mod checkpoint;
+pub mod driver;
+pub mod output;
+pub mod stats;
+
+pub use aov::Aov;
+pub use checkpoint::{Checkpoint, CheckpointError};
+pub use driver::{Budget, Outcome, Progress, Stop, render};
+pub use stats::RenderStats;

@@ -1,0 +1,228 @@
+//! `path`: unidirectional path tracing with next-event estimation (Kajiya 1986; Veach 1997, §9 and §10.2).
+//!
+//! Two techniques make every path of k edges that ends on a light with extent. Seen from its last vertex x before the light, *hit* draws
+//! the direction from the BSDF, with density p_bsdf · q (q: survival of Russian roulette at x) per steradian, and *next event* draws a light
+//! with probability P(l | x) and a direction to it with density p_l per steradian. Both weigh their paths by the heuristic
+//! over these two densities, so the weights of a path sum to one. Delta lights are reached by next event alone, and what follows a
+//! delta lobe by hits alone, each with weight one.
+
+use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params};
+use crate::emit::{DirectSample, LightEnd};
+use crate::film::{Film, FilmTile, SampleBuffer};
+use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::{Rgb, SolidAnglePdf, Vec3};
+use crate::mis::Heuristic;
+use crate::path::{Edge, Limits, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
+use crate::prepared::PreparedScene;
+use crate::ray::offset::{SegmentEnd, segment};
+use crate::ray::{Ray, RayKind, RayStats, Segment, Tracer};
+use crate::shade::Transport;
+use rayon::prelude::*;
+
+/// The registry's line.
+pub static SPEC: IntegratorSpec = IntegratorSpec {
+    name: "path",
+    aliases: &["volpath", "volpathmis", "prb"],
+    about: "Path tracing from the camera, with direct light sampled at every vertex and combined with hits by multiple importance sampling",
+    params: &[
+        ParamSpec {
+            name: "max_depth",
+            about: "largest number of edges of a path; 1 shows emitters, 2 adds direct light; -1: no limit",
+            default: ParamDefault::Int(-1, -1, 1_000_000),
+        },
+        ParamSpec {
+            name: "rr_depth",
+            about: "vertex (1 is the first hit) from which Russian roulette may end a path",
+            default: ParamDefault::Int(5, 1, 1_000_000),
+        },
+        ParamSpec {
+            name: "hide_emitters",
+            about: "emitters that the camera sees directly are black",
+            default: ParamDefault::Bool(false),
+        },
+        ParamSpec {
+            name: "heuristic",
+            about: "how the two techniques share a path",
+            default: ParamDefault::Choice("power", &["balance", "power"]),
+        },
+    ],
+    unbiased: true,
+    refuses: |_| None,
+    build: |params| Box::new(PathTracer::new(params)),
+};
+
+/// The random stream of eye sub-paths.
+const EYE_STREAM: u64 = 1;
+
+struct PathTracer {
+    limits: Limits,
+    hide_emitters: bool,
+    heuristic: Heuristic,
+}
+
+impl PathTracer {
+    fn new(params: &Params) -> PathTracer {
+        PathTracer {
+            limits: Limits {
+                max_edges: u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX),
+                roulette_from: params.int("rr_depth") as u32,
+            },
+            hide_emitters: params.bool("hide_emitters"),
+            heuristic: if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power },
+        }
+    }
+
+    fn render_tile(&self, iteration: &Iteration, tile: &mut FilmTile, samples: &mut SampleBuffer) -> RayStats {
+        let scene = iteration.scene;
+        let mut tracer = Tracer::new(&*scene.query);
+        let mut queue = ShadowQueue::new(RayKind::ShadowDirect);
+        samples.clear(tile);
+        for pixel in 0..tile.pixels() {
+            let (x, y) = tile.pixel(pixel);
+            let index = u64::from(y) * u64::from(scene.film_size[0]) + u64::from(x);
+            let mut sampler = PathSampler::new(iteration.seed, EYE_STREAM, index, iteration.index);
+            let u = sampler.origin();
+            let (offset, weight) = scene.filter.sample([u[0], u[1]]);
+            let raster = [x as f32 + 0.5 + offset[0], y as f32 + 0.5 + offset[1]];
+            let eye = scene.camera.sample_ray(raster, [u[2], u[3]]);
+            let start = WalkStart {
+                ray: Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far },
+                throughput: Rgb::grey(weight),
+                pdf: SolidAnglePdf(1.0),
+                delta: true,
+                kind: RayKind::Camera,
+            };
+            let mut hooks = Gather { tracer: self, scene, pixel, samples, queue: &mut queue };
+            walk(scene, start, &self.limits, Transport::Radiance, &mut tracer, &mut sampler, &mut hooks);
+        }
+        queue.flush(&mut tracer, |pixel, light| samples.add(pixel, light));
+        tile.commit(samples, iteration.index);
+        tracer.stats
+    }
+}
+
+impl Integrator for PathTracer {
+    fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
+        let this = &*self;
+        let stats = film
+            .tiles
+            .par_iter_mut()
+            .map_init(SampleBuffer::default, |samples, tile| this.render_tile(iteration, tile, samples))
+            .reduce(RayStats::default, |mut a, b| {
+                a.merge(&b);
+                a
+            });
+        film.iterations += 1;
+        stats
+    }
+}
+
+/// Collects light along one eye walk.
+struct Gather<'a> {
+    tracer: &'a PathTracer,
+    scene: &'a PreparedScene,
+    pixel: u32,
+    samples: &'a mut SampleBuffer,
+    queue: &'a mut ShadowQueue,
+}
+
+impl Gather<'_> {
+    /// Weight of a hit whose direction next event would have drawn with the density `next_event`.
+    fn hit_weight(&self, edge: &Edge, next_event: impl FnOnce() -> SolidAnglePdf) -> f32 {
+        if edge.delta {
+            1.0
+        } else {
+            self.tracer.heuristic.weight(SolidAnglePdf(edge.pdf.0 * edge.survival), next_event())
+        }
+    }
+
+    fn hidden(&self, index: u32) -> bool {
+        index == 1 && self.tracer.hide_emitters
+    }
+
+    /// Next event: queues the light that one sampled point of one light would bring.
+    #[inline]
+    fn next_event(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) {
+        let u = sampler.vertex(vertex.index, Purpose::Emitter);
+        let lights = &self.scene.lights;
+        let point = &vertex.point;
+        let Some((id, chosen)) = lights.pick_from(point.p, vertex.light_choice_normal(), u[0]) else { return };
+        let Some(light) = lights.get(id).sample_direct(point.p, [u[1], u[2]]) else { return };
+        let (value, bsdf_pdf) = vertex.bsdf.eval_and_pdf(vertex.wo, light.wi, Transport::Radiance);
+        if value.is_black() {
+            return;
+        }
+        let density = light.pdf * chosen;
+        let weight = if light.delta {
+            1.0
+        } else {
+            let survival = self.tracer.limits.survival(vertex.index, &vertex.bsdf);
+            self.tracer.heuristic.weight(density, SolidAnglePdf(bsdf_pdf.0 * survival))
+        };
+        let contribution = vertex.throughput * value * light.radiance * (weight / density.0);
+        // A black contribution needs no ray; one that is not finite goes on to the film, which reports it.
+        if contribution.is_black() {
+            return;
+        }
+        let segment = shadow_segment(point.p, point.error, point.ng, &light);
+        let samples = &mut *self.samples;
+        self.queue.push(&segment, contribution, self.pixel, tracer, |pixel, light| samples.add(pixel, light));
+    }
+}
+
+/// From a surface point to a sampled point of a light.
+#[inline]
+fn shadow_segment(p: Vec3, error: f32, ng: Vec3, light: &DirectSample) -> Segment {
+    let from = SegmentEnd::Surface { p, error, ng };
+    match light.end {
+        LightEnd::Surface { p, error, ng } => segment(&from, &SegmentEnd::Surface { p, error, ng }),
+        LightEnd::Point { p } => segment(&from, &SegmentEnd::Free(p)),
+        LightEnd::Infinite => Segment::to_infinity(from.leaving(light.wi), light.wi),
+    }
+}
+
+impl WalkHooks for Gather<'_> {
+    #[inline]
+    fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
+        let lights = &self.scene.lights;
+        if let Some(id) = self.scene.light_of(&vertex.hit)
+            && !self.hidden(vertex.index)
+        {
+            let light = lights.get(id);
+            let emitted = light.emitted([vertex.hit.u, vertex.hit.v], vertex.wo);
+            if !emitted.is_black() {
+                let edge = &vertex.edge;
+                let weight = self.hit_weight(edge, || {
+                    light.pdf_direct(edge.from, -vertex.wo, edge.distance)
+                        * lights.pmf_from(edge.from, edge.from_normal, id)
+                });
+                self.samples.add(self.pixel, vertex.throughput * emitted * weight);
+            }
+        }
+        if vertex.bsdf.is_black() {
+            return false;
+        }
+        if vertex.index < self.tracer.limits.max_edges && vertex.bsdf.connectable() {
+            self.next_event(vertex, tracer, sampler);
+        }
+        true
+    }
+
+    fn escaped(&mut self, index: u32, direction: Vec3, throughput: Rgb, edge: &Edge) {
+        if self.hidden(index) {
+            return;
+        }
+        let lights = &self.scene.lights;
+        for &id in lights.infinite() {
+            let light = lights.get(id);
+            let emitted = light.emitted([0.0; 2], -direction);
+            if !emitted.is_black() {
+                let weight = self.hit_weight(edge, || {
+                    light.pdf_direct(edge.from, direction, f32::INFINITY)
+                        * lights.pmf_from(edge.from, edge.from_normal, id)
+                });
+                self.samples.add(self.pixel, throughput * emitted * weight);
+            }
+        }
+    }
+}

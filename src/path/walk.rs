@@ -1,0 +1,112 @@
+//! The random walk: the only bounce loop of the program.
+//!
+//! From an origin it traces, resolves the surface, shows the vertex to the hooks, draws the next direction from the BSDF and plays Russian
+//! roulette, until a limit, a miss or a hook ends it. Whether it carries radiance or importance is [`Transport`]'s to say.
+//!
+//! Russian roulette starts at a vertex index counted from the sub-path's own origin and survives with a probability that depends on
+//! the vertex alone (its albedo, not the throughput), so that the density of a path is known from either of its ends.
+
+use super::vertex::{Edge, SurfaceVertex};
+use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::{Rgb, SolidAnglePdf, Vec3};
+use crate::prepared::PreparedScene;
+use crate::ray::{Ray, RayKind, T_MIN, Tracer, offset::offset_point};
+use crate::shade::{Bsdf, Transport};
+
+/// Where a walk begins.
+#[derive(Clone, Copy, Debug)]
+pub struct WalkStart {
+    /// The first ray; its direction has unit length.
+    pub ray: Ray,
+    /// Throughput of the first ray.
+    pub throughput: Rgb,
+    /// Density per steradian of its direction.
+    pub pdf: SolidAnglePdf,
+    /// The first ray comes from an origin that no other technique meets.
+    pub delta: bool,
+    /// What the first ray counts as.
+    pub kind: RayKind,
+}
+
+/// How long a walk may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Largest number of edges of the sub-path.
+    pub max_edges: u32,
+    /// Vertex index from which Russian roulette is played; the first hit is 1.
+    pub roulette_from: u32,
+}
+
+/// Survival probability of Russian roulette never exceeds this, so that walks between white mirrors end.
+const MAX_SURVIVAL: f32 = 0.95;
+
+impl Limits {
+    /// Probability to go on after vertex `index` with the BSDF `bsdf`; a function of the vertex alone.
+    #[inline]
+    pub fn survival(&self, index: u32, bsdf: &Bsdf) -> f32 {
+        if index < self.roulette_from { 1.0 } else { bsdf.albedo().max_component().min(MAX_SURVIVAL) }
+    }
+}
+
+/// What an integrator does on the way.
+pub trait WalkHooks {
+    /// A surface was met. Returns whether to go on.
+    fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool;
+
+    /// The ray left the scene in the direction `direction`; `throughput` and `edge` as for a vertex that would be there.
+    fn escaped(&mut self, index: u32, direction: Vec3, throughput: Rgb, edge: &Edge);
+}
+
+/// Walks; see the module's head.
+pub fn walk<H: WalkHooks>(
+    scene: &PreparedScene,
+    start: WalkStart,
+    limits: &Limits,
+    mode: Transport,
+    tracer: &mut Tracer,
+    sampler: &mut PathSampler,
+    hooks: &mut H,
+) {
+    let WalkStart { mut ray, mut throughput, pdf, delta, mut kind } = start;
+    let mut edge = Edge { from: ray.o, from_normal: None, pdf, delta, survival: 1.0, distance: f32::INFINITY };
+    for index in 1..=limits.max_edges {
+        let Some(hit) = tracer.closest(&ray, kind) else {
+            hooks.escaped(index, ray.d, throughput, &edge);
+            return;
+        };
+        edge.distance = hit.t;
+        let wo = -ray.d;
+        let (point, material) = scene.surface_point(&hit);
+        let bsdf = material.resolve(&point, wo);
+        let vertex = SurfaceVertex { index, hit, point, bsdf, wo, throughput, edge };
+        if !hooks.surface(&vertex, tracer, sampler) || index == limits.max_edges {
+            return;
+        }
+
+        let u = sampler.vertex(index, Purpose::Scatter);
+        let Some(sample) = vertex.bsdf.sample(wo, [u[0], u[1], u[2]], mode) else { return };
+        let survival = limits.survival(index, &vertex.bsdf);
+        if u[3] >= survival {
+            return;
+        }
+        throughput *= sample.value * (1.0 / (sample.pdf.0 * survival));
+        if throughput.is_black() {
+            return;
+        }
+        edge = Edge {
+            from: point.p,
+            from_normal: vertex.light_choice_normal(),
+            pdf: sample.pdf,
+            delta: sample.delta,
+            survival,
+            distance: f32::INFINITY,
+        };
+        ray = Ray {
+            o: offset_point(point.p, point.error, point.ng, sample.wi),
+            d: sample.wi,
+            t_min: T_MIN,
+            t_max: f32::INFINITY,
+        };
+        kind = RayKind::Bounce;
+    }
+}

@@ -1,0 +1,66 @@
+//! Per-vertex data of a mesh and its interpolation.
+
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::shade::SurfacePoint;
+
+/// What shading needs of a mesh beside its triangles.
+#[derive(Debug, Default)]
+pub struct MeshShading {
+    /// Unit normals per vertex, or empty.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates per vertex, or empty.
+    pub uvs: Vec<Vec2>,
+    /// Colours per vertex, or empty.
+    pub colors: Vec<Rgb>,
+    /// Index of the material.
+    pub material: u32,
+    /// Number of the light that is the first triangle, if the mesh emits; the others follow.
+    pub first_light: Option<u32>,
+    /// The material depends on the direction of dp/du.
+    pub wants_tangents: bool,
+}
+
+impl MeshShading {
+    /// Nothing to interpolate.
+    #[inline]
+    pub fn is_plain(&self) -> bool {
+        self.normals.is_empty() && self.uvs.is_empty() && self.colors.is_empty() && !self.wants_tangents
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.normals.len() * 12 + self.uvs.len() * 8 + self.colors.len() * 12
+    }
+
+    /// Fills in the shading normal (as `frame.n`), texture coordinates, their derivatives and the colour of the point with barycentrics
+    /// `b` on the triangle with vertex indices `i` and edges e1 = v1 − v0, e2 = v2 − v0.
+    #[inline]
+    pub fn interpolate(&self, i: &[usize; 3], b: [f32; 3], [e1, e2]: [Vec3; 2], point: &mut SurfacePoint) {
+        if !self.normals.is_empty() {
+            let n = self.normals[i[0]] * b[0] + self.normals[i[1]] * b[1] + self.normals[i[2]] * b[2];
+            let length2 = n.length_squared();
+            // Opposite normals may cancel: the geometric normal serves then.
+            if length2 > 1e-12 && length2.is_finite() {
+                point.frame.n = n / length2.sqrt();
+            }
+        }
+        if !self.uvs.is_empty() {
+            let uv = i.map(|i| self.uvs[i]);
+            point.uv = uv[0] * b[0] + uv[1] * b[1] + uv[2] * b[2];
+            if self.wants_tangents {
+                let (d1, d2) = (uv[1] - uv[0], uv[2] - uv[0]);
+                let det = d1.x * d2.y - d1.y * d2.x;
+                if det != 0.0 {
+                    let dpdu = (e1 * d2.y - e2 * d1.y) / det;
+                    let dpdv = (e2 * d1.x - e1 * d2.x) / det;
+                    if dpdu.is_finite() && dpdv.is_finite() {
+                        (point.dpdu, point.dpdv) = (dpdu, dpdv);
+                    }
+                }
+            }
+        }
+        if !self.colors.is_empty() {
+            point.color = self.colors[i[0]] * b[0] + self.colors[i[1]] * b[1] + self.colors[i[2]] * b[2];
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The loop over iterations. Everything that happens per iteration counts against a time budget; loading does not. An iteration
+//! that would overshoot is not started.
+
+use super::stats::{Clock, cpu_seconds};
+use crate::film::Film;
+use crate::integrators::{Integrator, Iteration};
+use crate::prepared::PreparedScene;
+use crate::ray::RayStats;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// When to stop; whichever comes first.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Budget {
+    /// Iterations (samples per pixel) in all, those of a resumed checkpoint included.
+    pub iterations: Option<u64>,
+    /// Wall time of this run.
+    pub time: Option<Duration>,
+}
+
+/// Why the loop ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The budget is used up.
+    Budget,
+    /// Somebody asked.
+    Interrupted,
+}
+
+/// Where the render is; shown while it runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Iterations in the film.
+    pub iterations: u64,
+    /// Rays of this run.
+    pub rays: u64,
+    /// Wall time of this run.
+    pub elapsed: Duration,
+    /// Share of the budget used, 0 … 1.
+    pub done: f64,
+}
+
+/// How it went.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Why it ended.
+    pub stop: Stop,
+    /// Rays of this run.
+    pub rays: RayStats,
+    /// Wall time of this run's iterations.
+    pub wall: Duration,
+    /// Processor seconds of this run's iterations, all threads.
+    pub cpu_seconds: Option<f64>,
+    /// Iterations of this run.
+    pub iterations: u64,
+}
+
+/// Renders into `film` until the budget is used up or `interrupt` is set; calls `watch` after every iteration, which may save a
+/// checkpoint (its time is not counted). Runs on the current thread pool.
+pub fn render(
+    scene: &PreparedScene,
+    integrator: &mut dyn Integrator,
+    film: &mut Film,
+    seed: u64,
+    budget: Budget,
+    interrupt: &AtomicBool,
+    mut watch: impl FnMut(&Progress, &Film),
+) -> Outcome {
+    let mut clock = Clock::default();
+    let mut rays = RayStats::default();
+    let (cpu_before, first) = (cpu_seconds(), film.iterations);
+    let stop = loop {
+        if budget.iterations.is_some_and(|n| film.iterations >= n) {
+            break Stop::Budget;
+        }
+        let done = film.iterations - first;
+        if let Some(time) = budget.time
+            && done > 0
+            && clock.total() + clock.total() / u32::try_from(done).unwrap_or(u32::MAX) > time
+        {
+            break Stop::Budget;
+        }
+        if interrupt.load(Ordering::Relaxed) {
+            break Stop::Interrupted;
+        }
+        let iteration = Iteration { scene, seed, index: film.iterations };
+        let stats = clock.time(|| integrator.iterate(&iteration, film));
+        rays.merge(&stats);
+        let elapsed = clock.total();
+        watch(&Progress { iterations: film.iterations, rays: rays.total(), elapsed, done: share(&budget, film, elapsed) }, film);
+    };
+    let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
+    Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations: film.iterations - first }
+}
+
+fn share(budget: &Budget, film: &Film, elapsed: Duration) -> f64 {
+    let by_iterations = budget.iterations.map_or(0.0, |n| film.iterations as f64 / n.max(1) as f64);
+    let by_time = budget.time.map_or(0.0, |t| elapsed.as_secs_f64() / t.as_secs_f64().max(1e-9));
+    by_iterations.max(by_time).min(1.0)
+}

@@ -1,0 +1,152 @@
+//! Statistics of a render, as JSON with fixed keys.
+
+use super::Outcome;
+use crate::film::{Film, NonFinite};
+use crate::prepared::PreparedScene;
+use crate::ray::RayKind;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// Adds up stretches of wall time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Clock {
+    total: Duration,
+}
+
+impl Clock {
+    /// Runs `f` on the clock.
+    pub fn time<T>(&mut self, f: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let out = f();
+        self.total += start.elapsed();
+        out
+    }
+
+    /// Time so far.
+    pub fn total(&self) -> Duration {
+        self.total
+    }
+}
+
+/// Processor seconds of this process so far, all threads, where the system tells (Linux).
+pub fn cpu_seconds() -> Option<f64> {
+    // Fields 14 and 15 of /proc/self/stat, user and system time in clock ticks; the name in parentheses may hold blanks.
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let mut fields = stat.rsplit_once(')')?.1.split_whitespace();
+    let user: f64 = fields.nth(11)?.parse().ok()?;
+    let system: f64 = fields.next()?.parse().ok()?;
+    // USER_HZ is 100 on every Linux of today.
+    Some((user + system) / 100.0)
+}
+
+/// Largest resident memory of this process so far in bytes, where the system tells (Linux).
+pub fn peak_rss_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| kb * 1024)
+}
+
+/// The scene in numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneStats {
+    /// Triangles a ray can meet, instances counted each time.
+    pub triangles: usize,
+    /// Lights; every emitting triangle is one.
+    pub emitters: usize,
+    /// Pictures and patterns.
+    pub textures: usize,
+    /// Names of features.
+    pub features: Vec<&'static str>,
+}
+
+/// Statistics of one render. The keys are a contract.
+#[derive(Clone, Debug, Serialize)]
+pub struct RenderStats {
+    /// Samples per pixel in the film.
+    pub iterations: u64,
+    /// Wall seconds of the iterations of this run.
+    pub wall_s: f64,
+    /// Processor seconds of the same, all threads.
+    pub cpu_s: Option<f64>,
+    /// Wall seconds by phase.
+    pub phases: BTreeMap<&'static str, f64>,
+    /// Rays by kind.
+    pub rays: BTreeMap<&'static str, u64>,
+    /// Of shadow rays, how many were blocked, by kind.
+    pub blocked: BTreeMap<&'static str, u64>,
+    /// Nanoseconds of one thread per ray, by kind (sampled clock).
+    pub ns_per_ray: BTreeMap<&'static str, f64>,
+    /// Rays per wall second.
+    pub rays_per_s: f64,
+    /// Share of the render's wall time (all threads) inside ray queries, 0 … 1.
+    pub ray_query_share: f64,
+    /// Largest resident memory.
+    pub peak_rss_bytes: Option<u64>,
+    /// Samples that were not finite and were left out.
+    pub non_finite: u64,
+    /// Where the first of them were.
+    pub non_finite_at: Vec<NonFinite>,
+    /// Rays with a component that was not finite; not traced.
+    pub invalid_rays: u64,
+    /// Seed.
+    pub seed: u64,
+    /// Threads.
+    pub threads: usize,
+    /// Ray-query backend and its version.
+    pub backend: String,
+    /// Integrator.
+    pub integrator: &'static str,
+    /// Program version.
+    pub version: &'static str,
+    /// The scene.
+    pub scene: SceneStats,
+}
+
+impl RenderStats {
+    /// Puts the numbers together. `phases` holds what happened around the render itself (loading, preparing).
+    pub fn new(
+        scene: &PreparedScene,
+        film: &Film,
+        outcome: &Outcome,
+        mut phases: BTreeMap<&'static str, f64>,
+        textures: usize,
+        run: (u64, usize, &'static str),
+    ) -> RenderStats {
+        let (seed, threads, integrator) = run;
+        let wall = outcome.wall.as_secs_f64();
+        phases.insert("render", wall);
+        let (non_finite, non_finite_at) = film.non_finite();
+        let kinds = || RayKind::ALL.iter().map(|&k| (k.name(), &outcome.rays.kinds[k as usize]));
+        let rays = outcome.rays.total();
+        RenderStats {
+            iterations: film.iterations,
+            wall_s: wall,
+            cpu_s: outcome.cpu_seconds,
+            phases,
+            rays: kinds().map(|(n, k)| (n, k.rays)).collect(),
+            blocked: kinds().filter(|(_, k)| k.blocked > 0).map(|(n, k)| (n, k.blocked)).collect(),
+            ns_per_ray: kinds()
+                .filter(|(_, k)| k.rays > 0)
+                .map(|(n, k)| (n, k.seconds() * 1e9 / k.rays as f64))
+                .collect(),
+            rays_per_s: if wall > 0.0 { rays as f64 / wall } else { 0.0 },
+            ray_query_share: if wall > 0.0 { (outcome.rays.seconds() / (wall * threads as f64)).min(1.0) } else { 0.0 },
+            peak_rss_bytes: peak_rss_bytes(),
+            non_finite,
+            non_finite_at,
+            invalid_rays: outcome.rays.invalid,
+            seed,
+            threads,
+            backend: scene.query.describe(),
+            integrator,
+            version: env!("CARGO_PKG_VERSION"),
+            scene: SceneStats {
+                triangles: scene.geometry.triangle_count(),
+                emitters: scene.lights.len(),
+                textures,
+                features: scene.features.names(),
+            },
+        }
+    }
+}

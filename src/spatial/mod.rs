@@ -1,1 +1,0 @@
-//! Spatial indices for caches and lights.
