@@ -1,8 +1,10 @@
 //! Mathematics without any project types: colours, frames, warps with densities and inverses, hashed random streams,
 //! discrete and piecewise distributions, error-bounded floats, statistics.
 
+pub mod erf;
 pub mod float;
 pub mod frame;
+pub mod fresnel;
 pub mod hash;
 pub mod measure;
 pub mod rgb;
