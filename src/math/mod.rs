@@ -2,8 +2,10 @@
 //! discrete and piecewise distributions, error-bounded floats, statistics.
 
 pub mod discrete;
+pub mod erf;
 pub mod float;
 pub mod frame;
+pub mod fresnel;
 pub mod hash;
 pub mod measure;
 pub mod rgb;

@@ -12,9 +12,9 @@ pub mod bsdf;
 pub mod point;
 pub mod texture;
 
-pub use bsdf::{Bsdf, BsdfSample, Material};
+pub use bsdf::{Bsdf, BsdfSample, Features, Material, MaterialSet};
 pub use point::SurfacePoint;
-pub use texture::Texture;
+pub use texture::{ColorTexture, ScalarTexture, Texture, TextureSet};
 
 /// Which quantity a walk carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,13 +1,40 @@
 //! Bidirectional scattering distribution functions.
+//!
+//! A [`Material`] is a tree (two-sided, masks, blends, bump maps …) over scattering models; [`Material::resolve`] looks up its
+//! textures at a point and flattens it into a [`Bsdf`]: up to [`MAX_LEAVES`] weighted lobes, each in its own frame. The models are one
+//! file each and work in local coordinates ([`lobe`]).
+
+mod conductor;
+mod dielectric;
+mod diffuse;
+mod link;
+mod lobe;
+mod material;
+mod microfacet;
+mod node;
+mod phong;
+mod plastic;
+mod principled;
+mod rough_dielectric;
+mod rough_plastic;
+mod ward;
+
+#[cfg(test)]
+mod tests;
+
+pub use material::{Features, Material, MaterialSet};
 
 use super::{SurfacePoint, Transport};
-use crate::math::{Rgb, SolidAnglePdf, Vec3};
+use crate::math::{Frame, Rgb, SolidAnglePdf, Vec3};
+use arrayvec::ArrayVec;
+use diffuse::Diffuse;
+use link::{Link, ROOT};
+use lobe::{DeltaSample, Lobe, LobeSample};
 
-/// A material with its textures, shared by many points.
-pub struct Material;
-
-/// The BSDF at one point: every texture looked up, seen from `wo`.
-pub struct Bsdf;
+/// Most lobes a material may have at a point (a two-sided material counts both sides if its tree lets light through).
+pub const MAX_LEAVES: usize = 8;
+/// Most nested frames (bump maps, normal maps, backs of two-sided materials) in a material.
+const MAX_LINKS: usize = 8;
 
 /// A direction drawn from a BSDF.
 #[derive(Clone, Copy, Debug)]
@@ -28,38 +55,339 @@ pub struct BsdfSample {
     pub eta: f32,
 }
 
-impl Material {
-    /// Looks up every texture at `point` for a walk that arrived from `wo`.
-    pub fn resolve(&self, _point: &SurfacePoint, _wo: Vec3) -> Bsdf {
-        Bsdf
-    }
+/// A lobe with its share of the material.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    lobe: Lobe,
+    /// Multiplies values.
+    weight: f32,
+    /// Relative probability of being drawn from, before normalisation over the lobes that are active on a side.
+    pick: f32,
+    /// Innermost frame; [`ROOT`] for the point's own.
+    link: u8,
+    /// Whether it scatters light that is seen from the front and from the back of the point's frame.
+    active: [bool; 2],
+}
+
+/// The BSDF at one point: every texture looked up, seen from `wo`. A plain value without heap memory, cheap to make; it
+/// answers for the `wo` it was resolved with, and for any other direction on the same side or, in materials that let light through,
+/// on either side.
+#[derive(Clone, Debug)]
+pub struct Bsdf {
+    ng: Vec3,
+    frame: Frame,
+    leaves: ArrayVec<Leaf, MAX_LEAVES>,
+    links: ArrayVec<Link, MAX_LINKS>,
+    /// 1 / sum of the picks of the active leaves, seen from the front and from the back.
+    pick_scale: [f32; 2],
+}
+
+/// Index into the arrays of two sides.
+#[inline]
+fn side(z: f32) -> usize {
+    usize::from(z <= 0.0)
 }
 
 impl Bsdf {
+    fn empty(point: &SurfacePoint) -> Bsdf {
+        Bsdf { ng: point.ng, frame: point.frame, leaves: ArrayVec::new(), links: ArrayVec::new(), pick_scale: [0.0; 2] }
+    }
+
+    /// A single Lambertian lobe, if it is on the viewer's side.
+    #[inline]
+    fn set_lambert(&mut self, reflectance: Rgb, behind: bool) {
+        if !behind {
+            let lobe = Lobe::Diffuse(Diffuse { reflectance });
+            self.leaves.push(Leaf { lobe, weight: 1.0, pick: 1.0, link: ROOT, active: [true, false] });
+            self.pick_scale = [1.0, 0.0];
+        }
+    }
+
+    /// Normalises the choice of lobes; called once all leaves are in.
+    #[inline]
+    fn seal(&mut self) {
+        if let [leaf] = self.leaves.as_mut_slice() {
+            leaf.pick = 1.0;
+            self.pick_scale = leaf.active.map(|a| if a { 1.0 } else { 0.0 });
+            return;
+        }
+        for s in 0..2 {
+            let sum: f32 = self.leaves.iter().filter(|l| l.active[s]).map(|l| l.pick).sum();
+            self.pick_scale[s] = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+        }
+    }
+
+    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited.
+    #[inline]
+    fn lambert(&self) -> Option<&Diffuse> {
+        match self.leaves.as_slice() {
+            [Leaf { lobe: Lobe::Diffuse(diffuse), link: ROOT, .. }] => Some(diffuse),
+            _ => None,
+        }
+    }
+
+    /// |wi·ng| / |wo·ng|, the geometric half of the shading-normal factor; 0 for `wo` in the surface, where no light arrives.
+    #[inline]
+    fn geometric_ratio(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let o = wo.dot(self.ng).abs();
+        if o > 1e-7 { wi.dot(self.ng).abs() / o } else { 0.0 }
+    }
+
     /// Cosine weighted value f(wo, wi) · |cos θ_i|, delta lobes excluded.
-    pub fn eval(&self, _wo: Vec3, _wi: Vec3, _mode: Transport) -> Rgb {
-        Rgb::BLACK
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3, mode: Transport) -> Rgb {
+        self.eval_and_pdf(wo, wi, mode).0
+    }
+
+    /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once, sharing their work.
+    #[inline]
+    pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
+        match self.lambert() {
+            Some(diffuse) => {
+                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
+                if cos_o <= 0.0 || cos_i <= 0.0 {
+                    return (Rgb::BLACK, SolidAnglePdf(0.0));
+                }
+                let pdf = cos_i * std::f32::consts::FRAC_1_PI;
+                let value = match mode {
+                    Transport::Radiance => diffuse.reflectance * pdf,
+                    Transport::Importance => {
+                        diffuse.reflectance * (cos_o * std::f32::consts::FRAC_1_PI * self.geometric_ratio(wo, wi))
+                    }
+                };
+                (value, SolidAnglePdf(pdf))
+            }
+            None => self.eval_and_pdf_general(wo, wi, mode),
+        }
+    }
+
+    fn eval_and_pdf_general(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
+        let (o, i) = (self.frame.to_local(wo), self.frame.to_local(wi));
+        let scale = self.pick_scale[side(o.z)];
+        let (mut value, mut pdf) = (Rgb::BLACK, 0.0);
+        for leaf in &self.leaves {
+            let (v, p) = leaf.eval_pdf(&self.links, o, i, mode);
+            value += v * leaf.weight;
+            if leaf.active[side(o.z)] {
+                pdf += p * leaf.pick;
+            }
+        }
+        if mode == Transport::Importance {
+            value *= self.geometric_ratio(wo, wi);
+        }
+        (value, SolidAnglePdf(pdf * scale))
     }
 
     /// Density per steradian with which [`Bsdf::sample`] draws `wi` given `wo`, delta lobes excluded (their share of the
-    /// probability is missing from the integral).
-    pub fn pdf(&self, _wo: Vec3, _wi: Vec3, _mode: Transport) -> SolidAnglePdf {
-        SolidAnglePdf(0.0)
+    /// probability is missing from the integral). It does not depend on what the walk carries.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> SolidAnglePdf {
+        match self.lambert() {
+            Some(_) => {
+                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
+                SolidAnglePdf(if cos_o > 0.0 && cos_i > 0.0 { cos_i * std::f32::consts::FRAC_1_PI } else { 0.0 })
+            }
+            None => SolidAnglePdf(self.pdf_local(self.frame.to_local(wo), self.frame.to_local(wi))),
+        }
     }
 
-    /// Draws a direction; `u` = [lobe, u, v].
-    pub fn sample(&self, _wo: Vec3, _u: [f32; 3], _mode: Transport) -> Option<BsdfSample> {
-        None
+    /// The densities of `wi` given `wo` and of `wo` given `wi` (a walk in the opposite direction, which carries the opposite
+    /// quantity).
+    #[inline]
+    pub fn pdf_both(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> (SolidAnglePdf, SolidAnglePdf) {
+        match self.lambert() {
+            Some(_) => {
+                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
+                let inside = if cos_o > 0.0 && cos_i > 0.0 { std::f32::consts::FRAC_1_PI } else { 0.0 };
+                (SolidAnglePdf(cos_i * inside), SolidAnglePdf(cos_o * inside))
+            }
+            None => {
+                let (o, i) = (self.frame.to_local(wo), self.frame.to_local(wi));
+                (SolidAnglePdf(self.pdf_local(o, i)), SolidAnglePdf(self.pdf_local(i, o)))
+            }
+        }
+    }
+
+    /// Density of `b` given `a` in root coordinates.
+    fn pdf_local(&self, a: Vec3, b: Vec3) -> f32 {
+        let s = side(a.z);
+        let pdf = |leaf: &Leaf| {
+            if !leaf.active[s] {
+                return 0.0;
+            }
+            leaf.pick
+                * if leaf.link == ROOT {
+                    leaf.lobe.pdf(a, b)
+                } else {
+                    link::enter(&self.links, leaf.link, a, b)
+                        .map_or(0.0, |inside| leaf.lobe.pdf(inside.eye, inside.light))
+                }
+        };
+        self.leaves.iter().map(pdf).sum::<f32>() * self.pick_scale[s]
+    }
+
+    /// Draws a direction; `u` = [lobe, u, v]. `None` if the light is absorbed. Of a smooth event, `value` and `pdf` are what
+    /// [`Bsdf::eval`] and [`Bsdf::pdf`] say about the direction, all lobes summed; of a delta event they are those of the event alone.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
+        match self.lambert() {
+            Some(diffuse) => {
+                let local = diffuse.sample_direction(Vec3::new(0.0, 0.0, wo.dot(self.frame.n)), u)?;
+                self.smooth_sample(wo, self.frame.to_world(local).normalize(), 1.0, mode)
+            }
+            None => self.sample_general(wo, u, mode),
+        }
+    }
+
+    #[inline]
+    fn smooth_sample(&self, wo: Vec3, wi: Vec3, eta: f32, mode: Transport) -> Option<BsdfSample> {
+        let (value, pdf) = self.eval_and_pdf(wo, wi, mode);
+        (pdf.0 > 0.0).then_some(BsdfSample {
+            wi,
+            value,
+            pdf,
+            pdf_reverse_delta: SolidAnglePdf(0.0),
+            delta: false,
+            passes_through: false,
+            eta,
+        })
+    }
+
+    fn sample_general(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
+        let o = self.frame.to_local(wo);
+        let s = side(o.z);
+        let (leaf, share, rest) = self.pick(s, u[0])?;
+        let (frame, a) = link::frame_of(&self.links, leaf.link, o);
+        match leaf.lobe.sample(a, [rest, u[1], u[2]])? {
+            LobeSample::Smooth(b) => {
+                let wi = self.frame.to_world(frame.to_world(b)).normalize();
+                let eta = leaf.lobe.eta();
+                let crossed = a.z * b.z < 0.0;
+                let eta = match (crossed, a.z > 0.0) {
+                    (false, _) => 1.0,
+                    (true, true) => eta,
+                    (true, false) => 1.0 / eta,
+                };
+                self.smooth_sample(wo, wi, eta, mode)
+            }
+            LobeSample::Delta(event) => self.delta_sample(wo, o, a, leaf, share, event, frame.to_world(event.b), mode),
+        }
+    }
+
+    /// Chooses a leaf: the leaf, its probability, and what is left of the random number.
+    fn pick(&self, s: usize, u: f32) -> Option<(&Leaf, f32, f32)> {
+        let (mut rest, mut last) = (u, None);
+        for leaf in self.leaves.iter().filter(|l| l.active[s]) {
+            let share = leaf.pick * self.pick_scale[s];
+            if share > 0.0 {
+                if rest < share {
+                    return Some((leaf, share, (rest / share).min(crate::math::float::ONE_MINUS_EPSILON)));
+                }
+                rest -= share;
+                last = Some((leaf, share));
+            }
+        }
+        // Rounding left a sliver above the last share.
+        last.map(|(leaf, share)| (leaf, share, crate::math::float::ONE_MINUS_EPSILON))
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn delta_sample(
+        &self,
+        wo: Vec3,
+        o: Vec3,
+        a: Vec3,
+        leaf: &Leaf,
+        share: f32,
+        event: DeltaSample,
+        i: Vec3,
+        mode: Transport,
+    ) -> Option<BsdfSample> {
+        let wi = if event.passes_through { -wo } else { self.frame.to_world(i).normalize() };
+        let mut value = event.value * leaf.weight;
+        if !event.passes_through {
+            let inside = match mode {
+                Transport::Radiance => link::enter(&self.links, leaf.link, o, i)?,
+                Transport::Importance => link::enter(&self.links, leaf.link, i, o)?,
+            };
+            value *= inside.shadowing;
+            if mode == Transport::Importance {
+                let cos = event.b.z.abs();
+                if cos == 0.0 {
+                    return None;
+                }
+                value *= event.eta * event.eta * self.geometric_ratio(wo, wi) * a.z.abs() / cos;
+            }
+        }
+        let reverse = if leaf.active[side(i.z)] { leaf.pick * self.pick_scale[side(i.z)] } else { 0.0 };
+        Some(BsdfSample {
+            wi,
+            value,
+            pdf: SolidAnglePdf(share * event.pdf),
+            pdf_reverse_delta: SolidAnglePdf(reverse * event.pdf_reverse),
+            delta: true,
+            passes_through: event.passes_through,
+            eta: event.eta,
+        })
     }
 
     /// Approximate albedo per channel, independent of direction: Russian roulette uses it, and it must be the same from
     /// whichever side the point is reached.
+    #[inline]
     pub fn albedo(&self) -> Rgb {
-        Rgb::BLACK
+        if let Some(diffuse) = self.lambert() {
+            return diffuse.reflectance;
+        }
+        let seen =
+            |s: usize| -> Rgb { self.leaves.iter().filter(|l| l.active[s]).map(|l| l.lobe.albedo() * l.weight).sum() };
+        let (front, back) = (seen(0), seen(1));
+        Rgb::new(front.r.max(back.r), front.g.max(back.g), front.b.max(back.b)).map(|c| c.min(1.0))
     }
 
     /// True if a connection to this point can carry light: some lobe is not a delta.
+    #[inline]
     pub fn connectable(&self) -> bool {
-        false
+        self.leaves.iter().any(|leaf| leaf.lobe.is_smooth())
+    }
+}
+
+impl Leaf {
+    /// Value and density of `i` given `o`, in root coordinates; in importance mode without the geometric ratio.
+    fn eval_pdf(&self, links: &[Link], o: Vec3, i: Vec3, mode: Transport) -> (Rgb, f32) {
+        if self.link == ROOT {
+            let (value, pdf) = self.lobe.eval_pdf(o, i);
+            return match mode {
+                Transport::Radiance => (value, pdf),
+                Transport::Importance => (value * self.adjoint_factor(o, i), pdf),
+            };
+        }
+        match mode {
+            Transport::Radiance => link::enter(links, self.link, o, i).map_or((Rgb::BLACK, 0.0), |inside| {
+                let (value, pdf) = self.lobe.eval_pdf(inside.eye, inside.light);
+                (value * inside.shadowing, pdf)
+            }),
+            Transport::Importance => {
+                // Tilted normals and their shadowing tell eye and light apart: the adjoint is the radiance seen the other way.
+                let value = link::enter(links, self.link, i, o)
+                    .map_or(Rgb::BLACK, |inside| self.lobe.eval_pdf(inside.eye, inside.light).0 * inside.shadowing);
+                let pdf =
+                    link::enter(links, self.link, o, i).map_or(0.0, |inside| self.lobe.pdf(inside.eye, inside.light));
+                (value, pdf)
+            }
+        }
+    }
+
+    /// What turns the radiance value at (o, i) into that at (i, o): η² and the exchange of the cosine.
+    fn adjoint_factor(&self, o: Vec3, i: Vec3) -> f32 {
+        if i.z == 0.0 {
+            return 0.0;
+        }
+        let swap = o.z.abs() / i.z.abs();
+        if o.z * i.z > 0.0 {
+            swap
+        } else {
+            let eta = if o.z > 0.0 { self.lobe.eta() } else { 1.0 / self.lobe.eta() };
+            swap * eta * eta
+        }
     }
 }
