@@ -12,6 +12,7 @@ pub(super) fn encode(picture: &Picture) -> Result<Vec<u8>, String> {
     for layer in &picture.layers {
         for (name, values) in &layer.channels {
             let name = if layer.name.is_empty() { (*name).to_owned() } else { format!("{}.{name}", layer.name) };
+            check_name(&name)?;
             if !seen.insert(name.clone()) {
                 return Err(format!("there are two channels of the name {name}"));
             }
@@ -25,6 +26,7 @@ pub(super) fn encode(picture: &Picture) -> Result<Vec<u8>, String> {
     let encoding = e::Encoding::SMALL_LOSSLESS;
     let mut attributes = e::LayerAttributes::default();
     for (name, value) in &picture.metadata {
+        check_name(name)?;
         if attributes.other.insert(text(name), e::AttributeValue::Text(text(value))).is_some() {
             return Err(format!("there are two metadata of the name {name}"));
         }
@@ -37,6 +39,14 @@ pub(super) fn encode(picture: &Picture) -> Result<Vec<u8>, String> {
     let mut bytes = out.into_inner();
     sort_attributes(&mut bytes);
     Ok(bytes)
+}
+
+/// Names end with a zero byte in the file, and 255 bytes is the format's limit.
+fn check_name(name: &str) -> Result<(), String> {
+    if name.is_empty() || name.len() > 255 || name.contains('\0') {
+        return Err(format!("\"{}\" cannot be a name in an EXR file", name.escape_default()));
+    }
+    Ok(())
 }
 
 /// UTF-8, as OpenEXR's own text functions write it.
