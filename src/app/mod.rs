@@ -1,6 +1,76 @@
 //! The command line; the only room that prints.
 
+mod check_rays;
+mod cli;
+mod compare;
+mod config;
+mod info;
+mod render;
+mod report;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Why a command did not succeed; each kind has its exit code.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Bad usage or input, already explained on standard error if the text is empty.
+    Input(String),
+    /// The file system refused.
+    Io(String),
+    /// `--strict`, and samples were not finite.
+    NonFinite(u64),
+    /// Ctrl-C; everything was written.
+    Interrupted,
+}
+
+impl Failure {
+    pub(crate) fn input(e: impl std::fmt::Display) -> Failure {
+        Failure::Input(e.to_string())
+    }
+
+    pub(crate) fn io(e: impl std::fmt::Display) -> Failure {
+        Failure::Io(e.to_string())
+    }
+
+    fn exit_code(&self) -> u8 {
+        match self {
+            Failure::NonFinite(_) => 1,
+            Failure::Input(_) => 2,
+            Failure::Io(_) => 3,
+            Failure::Interrupted => 130,
+        }
+    }
+}
+
 /// Runs the program and says how it ended.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+pub fn main() -> ExitCode {
+    let cli = match cli::Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            // Help and version are errors to clap, but not to the user.
+            let code = if e.use_stderr() { 2 } else { 0 };
+            let _ = e.print();
+            return ExitCode::from(code);
+        }
+    };
+    let result = match cli.command {
+        cli::Command::Render(args) => render::run(&args),
+        cli::Command::Info(args) => info::run(&args),
+        cli::Command::List(args) => info::list(&args),
+        cli::Command::CheckRays(args) => check_rays::run(&args),
+        cli::Command::Compare(args) => compare::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            match &failure {
+                Failure::Input(text) | Failure::Io(text) if text.is_empty() => {}
+                Failure::Input(text) | Failure::Io(text) => eprintln!("error: {text}"),
+                Failure::NonFinite(n) => eprintln!("error: {n} samples were not finite (--strict)"),
+                Failure::Interrupted => eprintln!("interrupted"),
+            }
+            ExitCode::from(failure.exit_code())
+        }
+    }
 }

@@ -14,7 +14,7 @@ pub enum ParamDefault {
 }
 
 /// Declaration of a parameter.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParamSpec {
     /// Key.
     pub name: &'static str,
@@ -44,9 +44,7 @@ impl ParamDefault {
 
     fn parse(&self, text: &str) -> Option<Value> {
         match *self {
-            ParamDefault::Int(_, lo, hi) => {
-                text.parse().ok().filter(|v| (lo..=hi).contains(v)).map(Value::Int)
-            }
+            ParamDefault::Int(_, lo, hi) => text.parse().ok().filter(|v| (lo..=hi).contains(v)).map(Value::Int),
             ParamDefault::Bool(_) => text.parse().ok().map(Value::Bool),
             ParamDefault::Choice(_, all) => all.iter().find(|c| **c == text).map(|c| Value::Choice(c)),
         }

@@ -3,13 +3,13 @@
 use super::{Features, MeshShading, PreparedScene};
 use crate::emit::{
     Camera, DirectionalLight, EmitError, Environment, EnvironmentLight, Light, LightSet, PixelFilter, PointLight,
-    RadianceTexture, SpotLight, TriangleEmission, TriangleLight,
+    RadianceTexture, SpotLight, TriangleEmission, TriangleLight, triangle::TexturedEmission,
 };
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 use crate::ray::{Backend, Geometry, Instance, MeshBuffers, QueryError, VertexBuffer};
 use crate::scene::{
-    AreaEmission, ColorDesc, Diagnostic, Diagnostics, EmitterDesc, EmitterKind, ImageDesc, MeshDesc, SceneDesc,
-    ShapeDesc,
+    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, Diagnostic, Diagnostics, EmitterDesc, EmitterKind, ImageDesc,
+    MeshDesc, ScalarDesc, SceneDesc, ShapeDesc,
 };
 use crate::shade::{ColorTexture, MaterialSet, SurfacePoint, TextureSet};
 use glam::{Affine3A, DMat3, DMat4, Mat3A};
@@ -75,7 +75,9 @@ impl PreparedScene {
         }
 
         let centre = centre(&desc);
-        let mut placer = Placer { meshes: std::mem::take(&mut desc.meshes), uses: vec![], parts: vec![] };
+        let mut placer =
+            Placer { meshes: std::mem::take(&mut desc.meshes), uses: vec![], oriented: vec![], parts: vec![] };
+        placer.oriented = (0..desc.bsdfs.len()).map(|i| is_oriented(&desc.bsdfs, BsdfId(i as u32), 0)).collect();
         placer.count_uses(&desc);
         let mut geometry = Geometry::default();
         let to_origin = DMat4::from_translation(-centre);
@@ -91,7 +93,10 @@ impl PreparedScene {
                 ids.push(emission.len() as u32);
                 emission.push(None);
                 if shape.emission.is_some() {
-                    let d = Diagnostic::warning("scene::emitter-in-group", "a shape of a shapegroup cannot emit; its light is ignored");
+                    let d = Diagnostic::warning(
+                        "scene::emitter-in-group",
+                        "a shape of a shapegroup cannot emit; its light is ignored",
+                    );
                     diagnostics.push(d.at(shape.span.clone()));
                 }
                 placer.place(shape, shape.to_world, &materials);
@@ -131,7 +136,8 @@ impl PreparedScene {
         let lights = LightSet::new(lights);
 
         let camera = Camera::new(&sensor, centre)?;
-        let features = features(&desc, &sensor, &materials, &lights, &shading, window != [0, 0, film_size[0], film_size[1]]);
+        let features =
+            features(&desc, &sensor, &materials, &lights, &shading, window != [0, 0, film_size[0], film_size[1]]);
         let geometry = Arc::new(geometry);
         let start = Instant::now();
         let query = options.backend.build(geometry.clone(), options.threads)?;
@@ -167,7 +173,9 @@ fn window([width, height]: [u32; 2], crop: Option<[u32; 4]>) -> Result<[u32; 4],
     if inside(x, w, width) && inside(y, h, height) {
         Ok([x, y, w, h])
     } else {
-        Err(PrepareError::Film(format!("the crop window {x},{y},{w},{h} leaves the picture of {width} x {height} pixels")))
+        Err(PrepareError::Film(format!(
+            "the crop window {x},{y},{w},{h} leaves the picture of {width} x {height} pixels"
+        )))
     }
 }
 
@@ -208,7 +216,8 @@ fn centre(desc: &SceneDesc) -> DVec3 {
 
 fn affine(m: DMat4) -> (Affine3A, Mat3A) {
     let linear = DMat3::from_mat4(m);
-    let single = |m: DMat3| Mat3A::from_cols(m.x_axis.as_vec3().into(), m.y_axis.as_vec3().into(), m.z_axis.as_vec3().into());
+    let single =
+        |m: DMat3| Mat3A::from_cols(m.x_axis.as_vec3().into(), m.y_axis.as_vec3().into(), m.z_axis.as_vec3().into());
     let to_world = Affine3A { matrix3: single(linear), translation: m.w_axis.truncate().as_vec3().into() };
     (to_world, single(linear.inverse().transpose()))
 }
@@ -218,7 +227,7 @@ struct Part {
     mesh: MeshDesc,
     to_place: DMat4,
     flip: bool,
-    material: u32,
+    material: Option<BsdfId>,
     wants_tangents: bool,
     wants_uvs: bool,
     wants_colors: bool,
@@ -228,6 +237,8 @@ struct Part {
 struct Placer {
     meshes: Vec<MeshDesc>,
     uses: Vec<u32>,
+    /// For each material: whether the direction of dp/du matters to it.
+    oriented: Vec<bool>,
     parts: Vec<Part>,
 }
 
@@ -251,18 +262,18 @@ impl Placer {
             }
             None => MeshDesc::default(),
         };
-        let material = materials.index_of(shape.bsdf);
+        let material = shape.bsdf;
         let wants = materials.get(material).features();
-        let emission_textured =
-            shape.emission.as_ref().is_some_and(|e| matches!(e.radiance, ColorDesc::Texture(_)));
+        let tangents = material.is_some_and(|m| self.oriented[m.index()]);
+        let emission_textured = shape.emission.as_ref().is_some_and(|e| matches!(e.radiance, ColorDesc::Texture(_)));
         self.parts.push(Part {
             mesh,
             to_place,
             flip: shape.flip_normals,
             material,
-            wants_tangents: wants.tangents,
-            wants_uvs: wants.textures || wants.tangents || emission_textured,
-            wants_colors: wants.textures,
+            wants_tangents: tangents,
+            wants_uvs: wants.textured || tangents || emission_textured,
+            wants_colors: wants.textured,
         });
     }
 
@@ -340,7 +351,7 @@ struct Emission(ColorTexture);
 
 impl RadianceTexture for Emission {
     fn at(&self, uv: Vec2) -> Rgb {
-        self.0.eval(&SurfacePoint::at_uv(uv))
+        self.0.eval(&SurfacePoint { uv, ..SurfacePoint::default() })
     }
 
     fn mean(&self) -> Rgb {
@@ -369,7 +380,7 @@ fn triangle_lights(
                 } else {
                     triangle.map(|i| shading.uvs[i as usize])
                 };
-                TriangleEmission::textured(texture.clone(), uv)
+                TriangleEmission::Textured(Box::new(TexturedEmission { texture: texture.clone(), uv }))
             }
             (None, ColorDesc::Texture(_)) => TriangleEmission::Constant(Rgb::BLACK),
         };
@@ -392,12 +403,39 @@ fn emitter_lights(
         EmitterKind::Directional { direction, irradiance } => {
             Light::Directional(DirectionalLight::new(*direction, *irradiance, radius)?)
         }
-        environment => {
-            let environment = Environment::from_desc(environment, images)?;
-            Light::Environment(Box::new(EnvironmentLight::new(environment, radius)))
-        }
+        environment => Light::Environment(Box::new(EnvironmentLight::new(surroundings(environment, images)?, radius))),
     });
     Ok(())
+}
+
+/// What surrounds the scene.
+fn surroundings(kind: &EmitterKind, _images: &[ImageDesc]) -> Result<Environment, EmitError> {
+    Ok(match kind {
+        EmitterKind::Constant { radiance } => Environment::Constant(*radiance),
+        _ => Environment::Constant(Rgb::BLACK),
+    })
+}
+
+/// True if a material depends on the direction of dp/du: anisotropy, bump and normal maps.
+fn is_oriented(bsdfs: &[BsdfDesc], id: BsdfId, nesting: usize) -> bool {
+    let Some(bsdf) = bsdfs.get(id.index()) else { return false };
+    // A chain longer than the arena goes in circles; building the materials reports it.
+    if nesting > bsdfs.len() {
+        return false;
+    }
+    let nested = |id: BsdfId| is_oriented(bsdfs, id, nesting + 1);
+    match &bsdf.kind {
+        BsdfKind::RoughDielectric { roughness, .. } | BsdfKind::RoughConductor { roughness, .. } => {
+            roughness.alpha_u != roughness.alpha_v
+        }
+        BsdfKind::Ward { alpha_u, alpha_v, .. } => alpha_u != alpha_v,
+        BsdfKind::Principled(p) => p.anisotropic != ScalarDesc::Constant(0.0),
+        BsdfKind::BumpMap { .. } | BsdfKind::NormalMap { .. } => true,
+        BsdfKind::TwoSided { front, back } => nested(*front) || nested(*back),
+        BsdfKind::Mask { nested: id, .. } => nested(*id),
+        BsdfKind::Blend { a, b, .. } => nested(*a) || nested(*b),
+        _ => false,
+    }
 }
 
 fn features(
@@ -411,7 +449,7 @@ fn features(
     let mut f = Features::default();
     for mesh in meshes {
         let m = materials.get(mesh.material).features();
-        f.set(Features::TEXTURES, m.textures);
+        f.set(Features::TEXTURES, m.textured);
         f.set(Features::MASKS, m.passes_through);
         f.set(Features::SPECULAR, m.delta);
         f.set(Features::SHADING_NORMALS, !mesh.normals.is_empty());

@@ -1,6 +1,7 @@
 //! Per-vertex data of a mesh and its interpolation.
 
 use crate::math::{Rgb, Vec2, Vec3};
+use crate::scene::BsdfId;
 use crate::shade::SurfacePoint;
 
 /// What shading needs of a mesh beside its triangles.
@@ -12,8 +13,8 @@ pub struct MeshShading {
     pub uvs: Vec<Vec2>,
     /// Colours per vertex, or empty.
     pub colors: Vec<Rgb>,
-    /// Index of the material.
-    pub material: u32,
+    /// The material; the default one if the file names none.
+    pub material: Option<BsdfId>,
     /// Number of the light that is the first triangle, if the mesh emits; the others follow.
     pub first_light: Option<u32>,
     /// The material depends on the direction of dp/du.

@@ -5,10 +5,10 @@
 
 use crate::film::{Film, NonFinite};
 use crate::image::atomic_write;
-use crate::prepared::PreparedScene;
 use crate::math::hash::{hash_words, mix64};
+use crate::prepared::PreparedScene;
 use serde::{Deserialize, Serialize};
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "lightsieve-checkpoint-1";
@@ -58,7 +58,11 @@ pub enum CheckpointError {
 
 /// Hash of everything in the scene that the picture depends on and that a scene file can change silently.
 fn scene_hash(scene: &PreparedScene) -> u64 {
-    let mut h = hash_words(&[scene.geometry.meshes.len() as u64, scene.lights.len() as u64, scene.features.names().len() as u64]);
+    let mut h = hash_words(&[
+        scene.geometry.meshes.len() as u64,
+        scene.lights.len() as u64,
+        scene.features.names().len() as u64,
+    ]);
     let mut add = |w: u64| h = mix64(h.rotate_left(5) ^ w);
     for mesh in &scene.geometry.meshes {
         for p in mesh.positions.iter() {
@@ -85,12 +89,7 @@ fn scene_hash(scene: &PreparedScene) -> u64 {
 
 impl Checkpoint {
     /// Describes a render.
-    pub fn new(
-        scene: &PreparedScene,
-        integrator: &str,
-        params: &[(&'static str, String)],
-        seed: u64,
-    ) -> Checkpoint {
+    pub fn new(scene: &PreparedScene, integrator: &str, params: &[(&'static str, String)], seed: u64) -> Checkpoint {
         Checkpoint {
             format: FORMAT.into(),
             integrator: integrator.into(),

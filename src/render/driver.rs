@@ -87,7 +87,10 @@ pub fn render(
         let stats = clock.time(|| integrator.iterate(&iteration, film));
         rays.merge(&stats);
         let elapsed = clock.total();
-        watch(&Progress { iterations: film.iterations, rays: rays.total(), elapsed, done: share(&budget, film, elapsed) }, film);
+        watch(
+            &Progress { iterations: film.iterations, rays: rays.total(), elapsed, done: share(&budget, film, elapsed) },
+            film,
+        );
     };
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
     Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations: film.iterations - first }

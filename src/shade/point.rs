@@ -22,3 +22,19 @@ pub struct SurfacePoint {
     /// Interpolated vertex colour (white where the mesh has none).
     pub color: Rgb,
 }
+
+impl Default for SurfacePoint {
+    /// The origin, facing +z.
+    fn default() -> SurfacePoint {
+        SurfacePoint {
+            p: Vec3::ZERO,
+            error: 0.0,
+            ng: Vec3::Z,
+            frame: Frame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z },
+            uv: Vec2::ZERO,
+            dpdu: Vec3::X,
+            dpdv: Vec3::Y,
+            color: Rgb::WHITE,
+        }
+    }
+}

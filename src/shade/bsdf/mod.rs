@@ -7,6 +7,7 @@
 mod conductor;
 mod dielectric;
 mod diffuse;
+mod facts;
 mod link;
 mod lobe;
 mod material;

@@ -1,0 +1,65 @@
+//! `lightsieve check-rays`: do the backends agree on this scene?
+
+use super::Failure;
+use super::cli::CheckRaysArgs;
+use super::report;
+use crate::prepared::{PrepareOptions, PreparedScene};
+use crate::ray::agreement::{Agreement, DISTANCE_TOLERANCE, compare};
+use crate::ray::{Backend, RayQuery};
+use std::collections::BTreeMap;
+
+/// Rays times triangles that the brute-force oracle may cost: beyond, it gets fewer rays.
+const BRUTE_WORK: u64 = 4_000_000_000;
+/// Share of questions that rounding may answer differently (grazing rays, vertices).
+const TOLERATED: f64 = 1e-3;
+
+pub(crate) fn run(args: &CheckRaysArgs) -> Result<(), Failure> {
+    let (desc, mut diagnostics) = report::load(&args.scene, false)?;
+    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let reference = Backend::default_available();
+    let options = PrepareOptions { backend: reference, threads, size: None, crop: None };
+    let scene = PreparedScene::build(desc, &options, &mut diagnostics).map_err(Failure::input)?;
+    let Some(bounds) = scene.geometry.bounds() else { return Err(Failure::Input("the scene has no triangles".into())) };
+
+    let mut rows: BTreeMap<String, Agreement> = BTreeMap::new();
+    let mut check = |backend: Backend, rays: u64| -> Result<(), Failure> {
+        if rays > 0 && backend != reference {
+            let other: Box<dyn RayQuery> = backend.build(scene.geometry.clone(), threads).map_err(Failure::input)?;
+            let row = compare(&*scene.query, &*other, bounds, rays, args.seed);
+            rows.insert(format!("{} / {}", scene.query.describe(), other.describe()), row);
+        }
+        Ok(())
+    };
+    check(Backend::Obvhs, args.rays)?;
+    let affordable = BRUTE_WORK / (3 * scene.geometry.triangle_count().max(1) as u64);
+    check(Backend::Brute, args.rays.min(affordable))?;
+
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&rows).map_err(Failure::io)?);
+    } else {
+        for (name, a) in &rows {
+            println!("{name}");
+            println!("  rays            {:>9}, both hit {}", a.rays, a.both_hit);
+            println!("  hit or miss     {:>9}  one met something, the other nothing", a.hit_or_miss);
+            println!("  other surface   {:>9}  another triangle at another distance", a.other_surface);
+            println!(
+                "  distance        {:>9}  same triangle, distance differs by more than {DISTANCE_TOLERANCE:e}",
+                a.distance
+            );
+            println!(
+                "  ties            {:>9}  another triangle at the same distance: shared edges, coplanar surfaces",
+                a.ties
+            );
+            println!("  occlusion       {:>9}  of {} segments", a.occlusion, a.segments);
+            println!("  packets         {:>9}  packet and single query of one backend differ", a.packet);
+            println!("  disagreement    {:>9.2e}  ties apart", a.disagreement());
+        }
+    }
+    let worst = rows.values().map(Agreement::disagreement).fold(0.0, f64::max);
+    if worst > TOLERATED {
+        return Err(Failure::Input(format!(
+            "the backends disagree on {worst:.1e} of the questions (tolerated: {TOLERATED:.0e})"
+        )));
+    }
+    Ok(())
+}

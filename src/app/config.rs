@@ -1,0 +1,94 @@
+//! What the command line and the scene file together mean: one integrator with all its parameters, and a budget.
+
+use super::Failure;
+use super::cli::RenderArgs;
+use crate::integrators::{self, IntegratorSpec, Params};
+use crate::render::{Aov, Budget};
+use crate::scene::diag::nearest;
+use crate::scene::{Diagnostic, Diagnostics, SceneDesc};
+
+/// A resolved render.
+pub(crate) struct Config {
+    pub spec: &'static IntegratorSpec,
+    pub params: Params,
+    pub budget: Budget,
+    pub threads: usize,
+    pub aovs: Vec<Aov>,
+}
+
+/// Samples per pixel when neither the command line nor the scene says.
+const DEFAULT_SPP: u64 = 64;
+
+impl Config {
+    pub fn resolve(args: &RenderArgs, desc: &SceneDesc, diagnostics: &mut Diagnostics) -> Result<Config, Failure> {
+        let spec = match (&args.integrator, &desc.integrator) {
+            (Some(name), _) => integrators::find(name).ok_or_else(|| unknown_integrator(name))?,
+            (None, Some(block)) => integrators::find(&block.name).unwrap_or_else(|| {
+                let d = Diagnostic::warning(
+                    "integrator::unknown",
+                    format!("integrator \"{}\" is not known here; rendering with \"path\"", block.name),
+                );
+                diagnostics.push(d.at(block.span.clone()));
+                &integrators::path::SPEC
+            }),
+            (None, None) => &integrators::path::SPEC,
+        };
+        let mut params = Params::defaults(spec);
+        for (key, value, span) in desc.integrator.iter().flat_map(|b| &b.params) {
+            // The scene's block is a proposal, perhaps for another integrator: what does not fit is said and left.
+            if let Err(e) = params.set(key, value) {
+                diagnostics.push(Diagnostic::warning("integrator::parameter", e.to_string()).at(span.clone()));
+            }
+        }
+        if let Some(depth) = args.max_depth {
+            params.set("max_depth", &depth.to_string()).map_err(Failure::input)?;
+        }
+        for (key, value) in &args.param {
+            params.set(key, value).map_err(Failure::input)?;
+        }
+        let file_spp = desc.sensors.first().and_then(|s| s.sample_count).map(u64::from);
+        let iterations = match (args.spp, args.time) {
+            (Some(spp), _) => Some(spp),
+            (None, Some(_)) => None,
+            (None, None) => Some(file_spp.unwrap_or(DEFAULT_SPP).max(1)),
+        };
+        let threads = args
+            .threads
+            .map_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get), |n| n as usize);
+        let aovs = args.aov.iter().map(|name| aov(name)).collect::<Result<_, _>>()?;
+        Ok(Config { spec, params, budget: Budget { iterations, time: args.time }, threads, aovs })
+    }
+
+    /// As lines of `key = value`.
+    pub fn print(&self, args: &RenderArgs) {
+        println!("scene = {}", args.scene.scene.display());
+        println!("integrator = {}", self.spec.name);
+        for (key, value) in self.params.pairs() {
+            println!("{key} = {value}");
+        }
+        if let Some(n) = self.budget.iterations {
+            println!("spp = {n}");
+        }
+        if let Some(t) = self.budget.time {
+            println!("time = {}s", t.as_secs_f64());
+        }
+        println!("seed = {}", args.seed);
+        println!("threads = {}", self.threads);
+    }
+}
+
+fn unknown_integrator(name: &str) -> Failure {
+    let known = || integrators::REGISTRY.iter().map(|s| s.name);
+    let hint = nearest(name, known()).map_or_else(
+        || format!("known: {}", known().collect::<Vec<_>>().join(", ")),
+        |n| format!("did you mean \"{n}\"?"),
+    );
+    Failure::Input(format!("unknown integrator \"{name}\"; {hint}"))
+}
+
+fn aov(name: &str) -> Result<Aov, Failure> {
+    Aov::ALL.iter().find(|(n, _)| *n == name).map(|&(_, a)| a).ok_or_else(|| {
+        let known: Vec<_> = Aov::ALL.iter().map(|(n, _)| *n).collect();
+        Failure::Input(format!("unknown layer \"{name}\"; known: {}", known.join(", ")))
+    })
+}

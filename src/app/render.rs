@@ -1,0 +1,225 @@
+//! `lightsieve render`.
+
+use super::Failure;
+use super::cli::{Query, RenderArgs};
+use super::config::Config;
+use super::report;
+use crate::film::Film;
+use crate::image::{OutputFormat, atomic_write, write_picture};
+use crate::prepared::{PrepareOptions, PreparedScene};
+use crate::render::stats::Clock;
+use crate::render::{Checkpoint, CheckpointError, Progress, RenderStats, Stop, aov, output, render};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::collections::BTreeMap;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Time between checkpoints.
+const CHECKPOINT_EVERY: Duration = Duration::from_secs(60);
+
+pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    // What is typed wrong is said before anything is loaded.
+    for path in &args.output {
+        OutputFormat::of(path).map_err(Failure::input)?;
+        check_folder(path)?;
+    }
+    for path in args.stats.iter().chain(&args.checkpoint) {
+        check_folder(path)?;
+    }
+    let mut phases = BTreeMap::new();
+    let mut clock = Clock::default();
+    let (desc, mut diagnostics) = clock.time(|| report::load(&args.scene, args.quiet))?;
+    phases.insert("load", clock.total().as_secs_f64());
+
+    let already_said = diagnostics.list.len();
+    let config = Config::resolve(args, &desc, &mut diagnostics)?;
+    if args.print_config {
+        config.print(args);
+        return Ok(());
+    }
+    let textures = desc.textures.len();
+    let mut clock = Clock::default();
+    let options = PrepareOptions {
+        backend: Query::backend(args.query),
+        threads: config.threads,
+        size: args.size,
+        crop: args.crop,
+    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(config.threads).build().map_err(Failure::input)?;
+    let prepared = clock.time(|| pool.install(|| PreparedScene::build(desc, &options, &mut diagnostics)));
+    diagnostics.list.drain(..already_said);
+    if !args.quiet || diagnostics.has_errors() {
+        report::print(&diagnostics);
+    }
+    let scene = prepared.map_err(Failure::input)?;
+    phases.insert("prepare", clock.total().as_secs_f64());
+    phases.insert("tree", scene.tree_seconds);
+    if let Some(reason) = (config.spec.refuses)(scene.features) {
+        return Err(Failure::Input(format!("{} cannot render this scene: {reason}", config.spec.name)));
+    }
+
+    let params = config.params.pairs();
+    let identity = (args.checkpoint.is_some() || args.resume.is_some())
+        .then(|| Checkpoint::new(&scene, config.spec.name, &params, args.seed));
+    let mut film = match (&args.resume, &identity) {
+        (Some(path), Some(identity)) => identity.load(path).map_err(checkpoint_failure)?,
+        _ => Film::new(scene.window),
+    };
+
+    let interrupt = Arc::new(AtomicBool::new(false));
+    catch_ctrl_c(interrupt.clone())?;
+    let bar = progress_bar(args.quiet);
+    let mut last_checkpoint = Instant::now();
+    let mut trouble = None;
+    let mut integrator = (config.spec.build)(&config.params);
+    let outcome = pool.install(|| {
+        render(&scene, &mut *integrator, &mut film, args.seed, config.budget, &interrupt, |progress, film| {
+            show(&bar, progress);
+            if let (Some(path), Some(identity)) = (&args.checkpoint, &identity)
+                && last_checkpoint.elapsed() > CHECKPOINT_EVERY
+            {
+                trouble = trouble.take().or(identity.save(path, film).err());
+                last_checkpoint = Instant::now();
+            }
+        })
+    });
+    bar.finish_and_clear();
+    if let (Some(path), Some(identity)) = (&args.checkpoint, &identity) {
+        trouble = identity.save(path, &film).err();
+    }
+
+    let run = (args.seed, config.threads, config.spec.name);
+    let mut stats = RenderStats::new(&scene, &film, &outcome, phases, textures, run);
+    let mut clock = Clock::default();
+    let written = clock.time(|| pool.install(|| write_outputs(args, &config, &scene, &film, &stats)));
+    stats.phases.insert("output", clock.total().as_secs_f64());
+    if let Some(path) = &args.stats {
+        write_json(path, &stats)?;
+    }
+    if !args.quiet {
+        summarise(&stats, &args.output);
+    }
+    written?;
+    if let Some(e) = trouble {
+        return Err(checkpoint_failure(e));
+    }
+    if outcome.stop == Stop::Interrupted {
+        return Err(Failure::Interrupted);
+    }
+    if args.scene.strict && stats.non_finite > 0 {
+        return Err(Failure::NonFinite(stats.non_finite));
+    }
+    Ok(())
+}
+
+fn checkpoint_failure(e: CheckpointError) -> Failure {
+    match e {
+        CheckpointError::Io { .. } => Failure::io(e),
+        CheckpointError::Format { .. } | CheckpointError::Other { .. } => Failure::input(e),
+    }
+}
+
+/// A folder that is not there would be found out only after hours of rendering.
+fn check_folder(path: &Path) -> Result<(), Failure> {
+    let folder =
+        path.parent().filter(|p| !p.as_os_str().is_empty()).map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+    if folder.is_dir() { Ok(()) } else { Err(Failure::Io(format!("{}: the folder does not exist", path.display()))) }
+}
+
+/// The first Ctrl-C lets the iteration end and everything be written; the second quits at once.
+fn catch_ctrl_c(interrupt: Arc<AtomicBool>) -> Result<(), Failure> {
+    ctrlc::set_handler(move || {
+        if interrupt.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .map_err(Failure::input)
+}
+
+const BAR_STEPS: u64 = 1000;
+
+fn progress_bar(quiet: bool) -> ProgressBar {
+    if quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(BAR_STEPS);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  ETA {eta}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn show(bar: &ProgressBar, progress: &Progress) {
+    bar.set_position((progress.done * BAR_STEPS as f64) as u64);
+    let rate = progress.rays as f64 / progress.elapsed.as_secs_f64().max(1e-9);
+    bar.set_message(format!("{} spp  {:.2} Mrays/s", progress.iterations, rate / 1e6));
+}
+
+fn write_outputs(
+    args: &RenderArgs,
+    config: &Config,
+    scene: &PreparedScene,
+    film: &Film,
+    stats: &RenderStats,
+) -> Result<(), Failure> {
+    if args.output.is_empty() {
+        return Ok(());
+    }
+    let layers = if config.aovs.is_empty() { vec![] } else { aov::layers(scene, film, args.seed, &config.aovs) };
+    let picture = output::picture(film, layers, metadata(args, config, stats));
+    for path in &args.output {
+        write_picture(path, &picture, args.exposure).map_err(Failure::io)?;
+    }
+    Ok(())
+}
+
+fn metadata(args: &RenderArgs, config: &Config, stats: &RenderStats) -> Vec<(String, String)> {
+    let params: Vec<String> = config.params.pairs().into_iter().map(|(k, v)| format!("{k}={v}")).collect();
+    [
+        ("software", format!("lightsieve {}", stats.version)),
+        ("scene", args.scene.scene.display().to_string()),
+        ("integrator", config.spec.name.to_string()),
+        ("parameters", params.join(" ")),
+        ("iterations", stats.iterations.to_string()),
+        ("seed", stats.seed.to_string()),
+        ("backend", stats.backend.clone()),
+        ("nonFinite", stats.non_finite.to_string()),
+        ("renderSeconds", format!("{:.3}", stats.wall_s)),
+        ("unbiased", config.spec.unbiased.to_string()),
+    ]
+    .into_iter()
+    .map(|(k, v)| (format!("lightsieve:{k}"), v))
+    .collect()
+}
+
+fn write_json(path: &Path, stats: &RenderStats) -> Result<(), Failure> {
+    let json = serde_json::to_string_pretty(stats).map_err(Failure::io)?;
+    atomic_write(path, |w| w.write_all(json.as_bytes()).and_then(|()| w.write_all(b"\n")))
+        .map_err(|e| Failure::Io(format!("{}: {e}", path.display())))
+}
+
+fn summarise(stats: &RenderStats, outputs: &[PathBuf]) {
+    eprintln!(
+        "{} samples per pixel in {:.2} s ({:.2} Mrays/s, {:.0} % of the time in ray queries, {})",
+        stats.iterations,
+        stats.wall_s,
+        stats.rays_per_s / 1e6,
+        100.0 * stats.ray_query_share,
+        stats.backend
+    );
+    if stats.non_finite > 0 {
+        eprintln!("warning: {} samples were not finite and were left out; the first:", stats.non_finite);
+        for p in &stats.non_finite_at {
+            eprintln!("  pixel {},{} iteration {}", p.x, p.y, p.iteration);
+        }
+    }
+    for path in outputs {
+        eprintln!("wrote {}", path.display());
+    }
+    if outputs.is_empty() {
+        eprintln!("no output file was asked for (-o FILE)");
+    }
+}

@@ -1,0 +1,17 @@
+//! What a BSDF can do at all: questions that save work.
+
+use super::Bsdf;
+
+impl Bsdf {
+    /// True if nothing is scattered: a walk ends here and no light need be sampled.
+    #[inline]
+    pub fn is_black(&self) -> bool {
+        self.leaves.is_empty() || self.lambert().is_some_and(|diffuse| diffuse.reflectance.is_black())
+    }
+
+    /// True if light from the other side than `wo`'s may contribute.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        self.leaves.iter().any(|leaf| leaf.active[0] && leaf.active[1])
+    }
+}
