@@ -6,6 +6,7 @@ pub mod float;
 pub mod frame;
 pub mod hash;
 pub mod measure;
+pub mod piecewise;
 pub mod rgb;
 pub mod sampler;
 pub mod warp;
