@@ -12,6 +12,7 @@
 //! Over the whole film the integral is N: a light image divides by the number of light sub-paths and nothing else.
 //! (Veach 1997, §4.3.2; Pharr et al. 2016, §16.1.1, where N = 1.)
 
+use super::orientation::Orientation;
 use super::{EmitError, PixelFilter, in_range};
 use crate::math::warp::square_to_disk;
 use crate::math::{AreaPdf, DVec3, SolidAnglePdf, Vec2, Vec3};
@@ -60,7 +61,7 @@ pub struct LensSample {
 pub struct Camera {
     position: Vec3,
     /// +x is to the left of the picture, +y up, +z into the scene.
-    axes: [Vec3; 3],
+    orientation: Orientation,
     /// Half extents of the film's image at distance one.
     half: Vec2,
     size: Vec2,
@@ -90,15 +91,10 @@ impl Camera {
             in_range("focus_distance", focus, focus > 0.0 && focus.is_finite(), "positive")?;
         }
 
-        let bad = || EmitError::Transform("camera");
-        let z = desc.to_world.z_axis.truncate().try_normalize().ok_or_else(bad)?;
-        let y = desc.to_world.y_axis.truncate();
-        let y = (y - z * z.dot(y)).try_normalize().ok_or_else(bad)?;
-        let x = y.cross(z);
-        let x = if x.dot(desc.to_world.x_axis.truncate()) < 0.0 { -x } else { x };
+        let orientation = Orientation::new(desc.to_world).ok_or(EmitError::Transform("camera"))?;
         let position = (desc.to_world.w_axis.truncate() - centre).as_vec3();
         if !position.is_finite() {
-            return Err(bad());
+            return Err(EmitError::Transform("camera"));
         }
 
         let aspect = w / h;
@@ -126,7 +122,7 @@ impl Camera {
         let [cx, cy, cw, ch] = film.crop.unwrap_or([0, 0, film.width, film.height]).map(|v| v as f32);
         Ok(Camera {
             position,
-            axes: [x.as_vec3(), y.as_vec3(), z.as_vec3()],
+            orientation,
             half: Vec2::new(half_x as f32, (half_x / aspect) as f32),
             size: Vec2::new(w as f32, h as f32),
             principal: Vec2::new(desc.principal_point[0] as f32, desc.principal_point[1] as f32),
@@ -145,7 +141,7 @@ impl Camera {
 
     /// Unit viewing axis.
     pub fn axis(&self) -> Vec3 {
-        self.axes[2]
+        self.orientation.z()
     }
 
     /// The camera has no lens: its position is a delta.
@@ -156,14 +152,6 @@ impl Camera {
     /// Angle that one pixel covers at the film's centre, about, in radians.
     pub fn pixel_angle(&self) -> f32 {
         2.0 * self.half.x / self.size.x
-    }
-
-    fn to_world(&self, v: Vec3) -> Vec3 {
-        self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
-    }
-
-    fn to_local(&self, v: Vec3) -> Vec3 {
-        Vec3::new(v.dot(self.axes[0]), v.dot(self.axes[1]), v.dot(self.axes[2]))
     }
 
     fn lens_point(&self, u: [f32; 2]) -> Vec3 {
@@ -197,8 +185,8 @@ impl Camera {
         let lens = self.lens_point(lens_u);
         let d = (in_focus - lens).normalize();
         CameraRay {
-            origin: self.position + self.to_world(lens),
-            direction: self.to_world(d).normalize(),
+            origin: self.position + self.orientation.to_world(lens),
+            direction: self.orientation.to_world(d).normalize(),
             t_near: self.near / d.z,
             t_far: self.far / d.z,
         }
@@ -207,8 +195,8 @@ impl Camera {
     /// Connects the point `from` to a point of the lens; `None` if it is not seen in the picture.
     pub fn sample_lens(&self, from: Vec3, u: [f32; 2]) -> Option<LensSample> {
         let lens = self.lens_point(u);
-        let p = self.position + self.to_world(lens);
-        let view = self.to_local(from - p);
+        let p = self.position + self.orientation.to_world(lens);
+        let view = self.orientation.to_local(from - p);
         let distance = view.length();
         if !(view.z > 0.0 && view.z >= self.near && view.z <= self.far && distance.is_finite()) {
             return None;
@@ -236,8 +224,8 @@ impl Camera {
     /// Densities of a camera ray from the lens point `origin` in the unit direction `direction`: of the lens point per unit area
     /// (1 for a pinhole) and of the direction per steradian (zero outside of the picture).
     pub fn pdf_ray(&self, origin: Vec3, direction: Vec3) -> (AreaPdf, SolidAnglePdf) {
-        let d = self.to_local(direction);
-        if d.z > 0.0 && self.reaches_picture(self.raster(self.to_local(origin - self.position), d)) {
+        let d = self.orientation.to_local(direction);
+        if d.z > 0.0 && self.reaches_picture(self.raster(self.orientation.to_local(origin - self.position), d)) {
             (self.pdf_lens(), SolidAnglePdf(self.direction_density(d.z)))
         } else {
             (self.pdf_lens(), SolidAnglePdf(0.0))

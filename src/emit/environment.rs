@@ -1,6 +1,8 @@
 //! Radiance from beyond the scene, in every direction.
 
+use super::envmap::EnvMap;
 use super::sample::{DirectSample, EmissionSample, LightEnd};
+use super::sunsky::SunSky;
 use crate::math::warp::{SPHERE_PDF, square_to_disk, square_to_sphere};
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec3};
 use std::f32::consts::PI;
@@ -10,27 +12,37 @@ use std::f32::consts::PI;
 pub enum Environment {
     /// The same radiance from everywhere.
     Constant(Rgb),
+    /// A picture.
+    Map(Box<EnvMap>),
+    /// Clear sky and sun.
+    SunSky(Box<SunSky>),
 }
 
 impl Environment {
     /// Radiance seen in the direction `dir`.
-    pub fn radiance(&self, _dir: Vec3) -> Rgb {
+    pub fn radiance(&self, dir: Vec3) -> Rgb {
         match self {
             Environment::Constant(radiance) => *radiance,
+            Environment::Map(map) => map.radiance(dir),
+            Environment::SunSky(sky) => sky.radiance(dir),
         }
     }
 
-    /// Draws a direction roughly in proportion to radiance; `None` if everything is black.
+    /// Draws a direction roughly in proportion to radiance, with its density per steradian; `None` if there is no light there.
     pub fn sample(&self, u: [f32; 2]) -> Option<(Vec3, SolidAnglePdf)> {
         match self {
             Environment::Constant(_) => Some((square_to_sphere(u), SolidAnglePdf(SPHERE_PDF))),
+            Environment::Map(map) => map.sample(u),
+            Environment::SunSky(sky) => sky.sample(u),
         }
     }
 
-    /// Density of [`Environment::sample`] per steradian.
-    pub fn pdf(&self, _dir: Vec3) -> SolidAnglePdf {
+    /// Density of [`Environment::sample`] per steradian; positive wherever there is light.
+    pub fn pdf(&self, dir: Vec3) -> SolidAnglePdf {
         match self {
             Environment::Constant(_) => SolidAnglePdf(SPHERE_PDF),
+            Environment::Map(map) => map.pdf(dir),
+            Environment::SunSky(sky) => sky.pdf(dir),
         }
     }
 
@@ -38,6 +50,8 @@ impl Environment {
     pub fn integral(&self) -> Rgb {
         match self {
             Environment::Constant(radiance) => *radiance * (4.0 * PI),
+            Environment::Map(map) => map.integral(),
+            Environment::SunSky(sky) => sky.integral(),
         }
     }
 }

@@ -1,7 +1,12 @@
 //! All lights of a scene, and the choice of one.
+//!
+//! Light sub-paths choose in proportion to power. Direct light chooses for the point that is lit: lights with a position through a
+//! [`LightTree`] when there are more than a handful, lights at infinity with a share of their own, since their power (it grows with
+//! the scene's size) says nothing about what arrives at a point.
 
 use super::light::Light;
-use crate::math::discrete::AliasTable;
+use super::light_tree::LightTree;
+use crate::math::discrete::{AliasTable, Cdf};
 use crate::math::{Pmf, Vec3};
 
 /// Index of a light in its [`LightSet`].
@@ -21,6 +26,47 @@ pub struct LightSet {
     lights: Vec<Light>,
     infinite: Vec<LightId>,
     by_power: AliasTable,
+    direct: Option<Direct>,
+}
+
+/// Choice for a point, where it differs from the choice by power.
+#[derive(Debug)]
+struct Direct {
+    tree: LightTree,
+    /// Probability of choosing among the lights at infinity.
+    infinite_share: f32,
+    /// By power among all lights, those with a position having none.
+    infinite: Cdf,
+}
+
+/// Up to this many lights with a position are chosen by power alone.
+const HANDFUL: usize = 4;
+
+impl Direct {
+    fn new(lights: &[Light], powers: &[f32]) -> Option<Direct> {
+        let count = |infinite: bool| {
+            lights.iter().zip(powers).filter(|(l, p)| l.is_infinite() == infinite && **p > 0.0).count()
+        };
+        let (near, far) = (count(false), count(true));
+        if near == 0 || (far == 0 && near <= HANDFUL) {
+            return None;
+        }
+        let far_powers: Vec<f32> =
+            lights.iter().zip(powers).map(|(l, &p)| if l.is_infinite() { p } else { 0.0 }).collect();
+        let infinite_share = far as f32 / (far + 1) as f32;
+        Some(Direct { tree: LightTree::new(lights), infinite_share, infinite: Cdf::new(&far_powers) })
+    }
+
+    fn sample(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(LightId, Pmf)> {
+        let share = self.infinite_share;
+        if u < share {
+            let (i, pmf, _) = self.infinite.sample(u / share)?;
+            Some((LightId(i as u32), pmf * Pmf(share)))
+        } else {
+            let (i, pmf) = self.tree.sample(p, n, (u - share) / (1.0 - share))?;
+            Some((LightId(i), pmf * Pmf(1.0 - share)))
+        }
+    }
 }
 
 impl LightSet {
@@ -28,7 +74,8 @@ impl LightSet {
     pub fn new(lights: Vec<Light>) -> LightSet {
         let powers: Vec<f32> = lights.iter().map(Light::power).collect();
         let infinite = (0..lights.len()).filter(|&i| lights[i].is_infinite()).map(|i| LightId(i as u32)).collect();
-        LightSet { infinite, by_power: AliasTable::new(&powers), lights }
+        let direct = Direct::new(&lights, &powers);
+        LightSet { infinite, by_power: AliasTable::new(&powers), direct, lights }
     }
 
     /// The light `id` of this set.
@@ -74,13 +121,25 @@ impl LightSet {
         self.by_power.pmf(id.index())
     }
 
-    /// Chooses a light for the point `p`, whose normal is `n` if it has one: the choice for direct light.
-    pub fn pick_from(&self, _p: Vec3, _n: Option<Vec3>, u: f32) -> Option<(LightId, Pmf)> {
-        self.pick(u)
+    /// Chooses a light for the point `p`: the choice for direct light. `n` is the unit geometric normal on the side where light is
+    /// received; lights wholly below its horizon get no probability. `None` if light counts from both sides, or in a volume.
+    ///
+    /// The probability is exactly [`LightSet::pmf_from`] with the same `p` and `n`. `None` is returned only if no light has power.
+    pub fn pick_from(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(LightId, Pmf)> {
+        match &self.direct {
+            None => self.pick(u),
+            Some(direct) => direct.sample(p, n, u),
+        }
     }
 
-    /// Probability of [`LightSet::pick_from`] with the same `p` and `n`.
-    pub fn pmf_from(&self, _p: Vec3, _n: Option<Vec3>, id: LightId) -> Pmf {
-        self.pmf(id)
+    /// Probability of [`LightSet::pick_from`] with the same `p` and `n`. They sum to one over all lights.
+    pub fn pmf_from(&self, p: Vec3, n: Option<Vec3>, id: LightId) -> Pmf {
+        match &self.direct {
+            None => self.pmf(id),
+            Some(d) if self.lights.get(id.index()).is_some_and(Light::is_infinite) => {
+                d.infinite.pmf(id.index()) * Pmf(d.infinite_share)
+            }
+            Some(d) => d.tree.pmf(p, n, id.0) * Pmf(1.0 - d.infinite_share),
+        }
     }
 }

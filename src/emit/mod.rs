@@ -8,20 +8,28 @@
 pub mod camera;
 pub mod delta;
 pub mod environment;
+pub mod envmap;
 pub mod filter;
 pub mod light;
+pub mod light_tree;
 pub mod lights;
+mod orientation;
 pub mod sample;
+mod spherical_triangle;
+mod sun_table;
+pub mod sunsky;
 pub mod triangle;
 
 pub use camera::{Camera, CameraRay, LensSample};
 pub use delta::{DirectionalLight, PointLight, SpotLight};
 pub use environment::{Environment, EnvironmentLight};
+pub use envmap::EnvMap;
 pub use filter::PixelFilter;
 pub use light::Light;
 pub use lights::{LightId, LightSet};
 pub use sample::{DirectSample, EmissionSample, LightEnd};
-pub use triangle::{RadianceTexture, TriangleEmission, TriangleLight};
+pub use sunsky::{SunSky, SunSkyParams};
+pub use triangle::{RadianceTexture, TexturedEmission, TriangleEmission, TriangleLight};
 
 /// What a light or camera cannot be built from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -8,6 +8,7 @@ pub mod frame;
 pub mod fresnel;
 pub mod hash;
 pub mod measure;
+pub mod piecewise;
 pub mod rgb;
 pub mod sampler;
 pub mod warp;
