@@ -1,0 +1,166 @@
+//! Files that a scene names: remembered while the text is read, each once, and decoded in parallel afterwards.
+
+use super::mesh::{LoadedMesh, MeshError, MeshOptions};
+use super::primitives::Primitive;
+use super::report::Report;
+use super::{obj, ply, serialized};
+use crate::image::read::{Encoding, ImageError, read_image};
+use crate::image::{Image, Pixels};
+use crate::scene::diag::Diagnostic;
+use crate::scene::{ImageDesc, ImageId, MeshDesc, MeshId, SceneDesc, Span};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What a picture's values are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum ImageUse {
+    /// Colours: eight-bit files are sRGB.
+    Color,
+    /// Plain numbers.
+    Data,
+}
+
+/// Where triangles come from.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) enum MeshSource {
+    Ply(PathBuf),
+    Obj(PathBuf),
+    /// And which of the meshes in the file.
+    Serialized(PathBuf, u32),
+    Primitive(Primitive),
+}
+
+impl MeshSource {
+    fn path(&self) -> Option<&PathBuf> {
+        match self {
+            MeshSource::Ply(p) | MeshSource::Obj(p) | MeshSource::Serialized(p, _) => Some(p),
+            MeshSource::Primitive(_) => None,
+        }
+    }
+
+    fn load(&self, options: MeshOptions) -> Result<LoadedMesh, MeshError> {
+        match self {
+            MeshSource::Ply(path) => ply::read_ply(path, options),
+            MeshSource::Obj(path) => obj::read_obj(path, options),
+            MeshSource::Serialized(path, index) => serialized::read_serialized(path, *index, options),
+            MeshSource::Primitive(p) => Ok(LoadedMesh { mesh: p.mesh(options.mirrored), skipped_faces: 0 }),
+        }
+    }
+}
+
+/// Files to decode.
+#[derive(Debug, Default)]
+pub(super) struct Assets {
+    strict: bool,
+    images: Vec<(PathBuf, ImageUse, Option<Span>)>,
+    image_ids: HashMap<(PathBuf, ImageUse), ImageId>,
+    meshes: Vec<(MeshSource, MeshOptions, Span)>,
+    mesh_ids: HashMap<(MeshSource, MeshOptions), MeshId>,
+}
+
+impl Assets {
+    /// With `strict`, a picture that cannot be read is an error.
+    pub(super) fn new(strict: bool) -> Assets {
+        Assets { strict, ..Assets::default() }
+    }
+
+    /// The id that a picture will have.
+    pub(super) fn image(&mut self, path: PathBuf, usage: ImageUse, span: impl Into<Option<Span>>) -> ImageId {
+        *self.image_ids.entry((path.clone(), usage)).or_insert_with(|| {
+            self.images.push((path, usage, span.into()));
+            ImageId((self.images.len() - 1) as u32)
+        })
+    }
+
+    /// The id that a mesh will have.
+    pub(super) fn mesh(&mut self, source: MeshSource, options: MeshOptions, span: Span) -> MeshId {
+        *self.mesh_ids.entry((source.clone(), options)).or_insert_with(|| {
+            self.meshes.push((source, options, span));
+            MeshId((self.meshes.len() - 1) as u32)
+        })
+    }
+
+    /// Reports mesh files that are not there, without reading those that are.
+    pub(super) fn check_files_exist(&self, report: &mut Report) {
+        for (source, _, span) in &self.meshes {
+            if let Some(path) = source.path()
+                && let Err(e) = std::fs::metadata(path)
+            {
+                report.push_io(missing_mesh(path, &e.into()).at(span.clone()));
+            }
+        }
+    }
+
+    /// Decodes everything into the scene's arenas.
+    pub(super) fn decode(mut self, scene: &mut SceneDesc, report: &mut Report) {
+        let jobs = std::mem::take(&mut self.meshes);
+        let (images, meshes) = rayon::join(
+            || self.read_images(),
+            // One at a time to a thread: a mesh being read is no larger than it ends up.
+            || jobs.par_iter().with_max_len(1).map(|(source, options, _)| source.load(*options)).collect::<Vec<_>>(),
+        );
+        self.add_images(images, scene, report);
+        scene.meshes.reserve(meshes.len());
+        for (mesh, (source, _, span)) in meshes.into_iter().zip(jobs) {
+            let path = source.path().cloned().unwrap_or_default();
+            scene.meshes.push(match mesh {
+                Ok(loaded) => {
+                    if loaded.skipped_faces > 0 {
+                        let message = format!("`{}`: {} faces of fewer than three corners are left out", path.display(), loaded.skipped_faces);
+                        report.push(Diagnostic::warning("load::mesh", message).at(span));
+                    }
+                    loaded.mesh
+                }
+                Err(e) => {
+                    let io = matches!(e, MeshError::Io(_));
+                    let d = missing_mesh(&path, &e).at(span);
+                    if io { report.push_io(d) } else { report.push(d) }
+                    MeshDesc::default()
+                }
+            });
+        }
+    }
+
+    /// Decodes the pictures alone.
+    pub(super) fn decode_images(self, scene: &mut SceneDesc, report: &mut Report) {
+        let images = self.read_images();
+        self.add_images(images, scene, report);
+    }
+
+    fn read_images(&self) -> Vec<Result<Image, ImageError>> {
+        self.images.par_iter().map(|(path, usage, _)| read_image(path, encoding(*usage))).collect()
+    }
+
+    fn add_images(self, images: Vec<Result<Image, ImageError>>, scene: &mut SceneDesc, report: &mut Report) {
+        for (image, (path, _, span)) in images.into_iter().zip(self.images) {
+            let image = image.unwrap_or_else(|e| {
+                let message = format!("cannot read the picture `{}`: {e}", path.display());
+                if self.strict {
+                    report.push_io(Diagnostic::error("load::image", message).at(span));
+                } else {
+                    report.push(Diagnostic::warning("load::image", message).at(span).help("magenta is shown in its place"));
+                }
+                magenta()
+            });
+            scene.images.push(ImageDesc { path, image: Arc::new(image) });
+        }
+    }
+}
+
+fn missing_mesh(path: &std::path::Path, e: &MeshError) -> Diagnostic {
+    Diagnostic::error("load::mesh", format!("cannot read the mesh `{}`: {e}", path.display()))
+}
+
+fn encoding(usage: ImageUse) -> Encoding {
+    match usage {
+        ImageUse::Color => Encoding::Auto,
+        ImageUse::Data => Encoding::Linear,
+    }
+}
+
+/// One pixel that nobody overlooks.
+fn magenta() -> Image {
+    Image { width: 1, height: 1, channels: 3, pixels: Pixels::F32(vec![1.0, 0.0, 1.0]) }
+}

@@ -1,0 +1,96 @@
+//! What all mesh files share: options, errors, and the repairs every mesh gets before it enters a scene.
+
+use super::normals;
+use crate::scene::MeshDesc;
+use std::fmt;
+
+/// How to read a mesh, after the parameters of Mitsuba's mesh shapes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct MeshOptions {
+    /// Drop vertex normals: the surface is faceted.
+    pub face_normals: bool,
+    /// Texture v becomes 1 − v. Pictures have v = 0 at their *top* row here, as in Mitsuba 3; OBJ files have it at the bottom.
+    pub flip_v: bool,
+    /// The mesh is placed by a transform that mirrors. Vertex normals of the file keep their meaning then (they go with
+    /// the inverse transpose), while the winding turns round: it is reversed here so that both stay on one side.
+    pub mirrored: bool,
+}
+
+/// A mesh as read, with what was dropped on the way.
+#[derive(Debug)]
+pub(super) struct LoadedMesh {
+    pub mesh: MeshDesc,
+    /// Faces of fewer than three corners.
+    pub skipped_faces: u64,
+}
+
+/// Where in a mesh file something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Line, from 1.
+    Line(u64),
+    /// Offset from the beginning of the file.
+    Byte(u64),
+    /// The file as a whole.
+    File,
+}
+
+/// Why a mesh file could not be read.
+#[derive(Debug)]
+pub(super) enum MeshError {
+    /// The file system's reason.
+    Io(std::io::Error),
+    /// What is wrong in it.
+    Bad { place: Place, message: String },
+}
+
+impl MeshError {
+    pub(super) fn new(place: Place, message: impl Into<String>) -> MeshError {
+        MeshError::Bad { place, message: message.into() }
+    }
+}
+
+impl From<std::io::Error> for MeshError {
+    fn from(e: std::io::Error) -> MeshError {
+        MeshError::Io(e)
+    }
+}
+
+impl fmt::Display for MeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            MeshError::Io(e) => write!(f, "{e}"),
+            MeshError::Bad { place: Place::Line(line), message } => write!(f, "line {line}: {message}"),
+            MeshError::Bad { place: Place::Byte(byte), message } => write!(f, "byte {byte}: {message}"),
+            MeshError::Bad { place: Place::File, message } => write!(f, "{message}"),
+        }
+    }
+}
+
+/// Applies the options to a mesh as the file has it: normals dropped, completed or generated, v flipped, winding turned.
+pub(super) fn finish(mesh: &mut MeshDesc, options: MeshOptions) {
+    if options.flip_v {
+        for uv in &mut mesh.uvs {
+            uv.y = 1.0 - uv.y;
+        }
+    }
+    if options.face_normals {
+        mesh.normals = Vec::new();
+    } else if mesh.normals.is_empty() {
+        mesh.normals = normals::angle_weighted(&mesh.positions, &mesh.triangles);
+        if options.mirrored {
+            // Generated normals follow the winding as it is in the world.
+            mesh.normals.iter_mut().for_each(|n| *n = -*n);
+        }
+    } else {
+        normals::normalize_or_repair(mesh);
+        if options.mirrored {
+            reverse_winding(mesh);
+        }
+    }
+}
+
+/// Turns every triangle round.
+pub(super) fn reverse_winding(mesh: &mut MeshDesc) {
+    mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+}

@@ -1,0 +1,96 @@
+//! Lights that are not surfaces.
+
+use super::objects::Builder;
+use super::props::Props;
+use super::spectrum::Purpose::{Emission, Reflectance};
+use super::sun;
+use crate::load::assets::ImageUse;
+use crate::scene::diag::Diagnostic;
+use crate::scene::{EmitterDesc, EmitterKind};
+use glam::{DMat4, DVec3};
+
+const PLUGINS: [&str; 9] = ["area", "point", "spot", "directional", "constant", "envmap", "sunsky", "sun", "sky"];
+
+impl Builder<'_> {
+    /// An `<emitter>` that stands in the scene itself.
+    pub(super) fn emitter(&mut self, node: usize) {
+        let Some(props) = self.props(node) else { return };
+        if let Some(kind) = self.emitter_kind(&props) {
+            self.scene.emitters.push(EmitterDesc { kind, span: Some(props.span()) });
+        }
+        props.ignore(&["sampling_weight"]);
+        props.finish();
+    }
+
+    fn emitter_kind(&mut self, p: &Props<'_>) -> Option<EmitterKind> {
+        let to_world = |p: &Props<'_>| p.transform("to_world").unwrap_or(DMat4::IDENTITY);
+        Some(match p.plugin {
+            "area" => {
+                let d = Diagnostic::error("scene::misplaced-element", "an area light belongs inside a <shape>");
+                self.push(d.at(p.span()).label("no surface here"));
+                return None;
+            }
+            "point" => EmitterKind::Point {
+                position: p.vector("position").unwrap_or_else(|| to_world(p).transform_point3(DVec3::ZERO)),
+                intensity: self.rgb(p, "intensity", 1.0, Emission),
+            },
+            "spot" => {
+                if let Some(node) = p.get("texture") {
+                    self.push(Diagnostic::warning("scene::ignored-property", "a spot light's `texture` is ignored").at(node.span.clone()));
+                }
+                let cutoff = p.positive_or("cutoff_angle", 20.0);
+                EmitterKind::Spot {
+                    to_world: to_world(p),
+                    intensity: self.rgb(p, "intensity", 1.0, Emission),
+                    cutoff_angle: cutoff as f32,
+                    beam_width: p.float_or("beam_width", cutoff * 0.75) as f32,
+                }
+            }
+            "directional" => {
+                let direction = p.vector("direction").unwrap_or_else(|| to_world(p).transform_vector3(DVec3::Z));
+                let Some(direction) = direction.try_normalize() else {
+                    p.error("scene::bad-value", "the `direction` of a light must not be zero");
+                    return None;
+                };
+                EmitterKind::Directional { direction, irradiance: self.rgb(p, "irradiance", 1.0, Emission) }
+            }
+            "constant" => EmitterKind::Constant { radiance: self.rgb(p, "radiance", 1.0, Emission) },
+            "envmap" => {
+                let (path, span) = self.file(p, "filename")?;
+                EmitterKind::Envmap {
+                    image: self.assets.image(path, ImageUse::Color, span),
+                    scale: p.float_or("scale", 1.0) as f32,
+                    to_world: to_world(p),
+                }
+            }
+            "sunsky" | "sun" | "sky" => self.sun_sky(p, to_world(p)),
+            _ => {
+                self.unknown_plugin(p, &PLUGINS);
+                return None;
+            }
+        })
+    }
+
+    fn sun_sky(&mut self, p: &Props<'_>, to_world: DMat4) -> EmitterKind {
+        let legacy = p.element().legacy;
+        let given = p.vector("sun_direction").map(|d| if legacy { sun::from_y_up(d) } else { d });
+        let sun_direction = given.and_then(DVec3::try_normalize).unwrap_or_else(|| sun::direction(&sun::when_and_where(p), legacy));
+        let turbidity = p.float_or("turbidity", 3.0);
+        if !(1.0..=10.0).contains(&turbidity)
+            && let Some(node) = p.get("turbidity")
+        {
+            p.bad_value(node, "value", format!("a turbidity of {turbidity}"), "a number from 1 to 10");
+        }
+        let scale = p.float_or("scale", 1.0);
+        p.ignore(&["resolution", "stretch", "sun_radius_scale", "complex_sun"]);
+        EmitterKind::SunSky {
+            to_world: if legacy { to_world * sun::y_up() } else { to_world },
+            sun_direction,
+            turbidity: turbidity.clamp(1.0, 10.0) as f32,
+            albedo: self.rgb(p, "albedo", if legacy { 0.15 } else { 0.3 }, Reflectance),
+            sky_scale: if p.plugin == "sun" { 0.0 } else { (p.float_or("sky_scale", 1.0) * scale) as f32 },
+            sun_scale: if p.plugin == "sky" { 0.0 } else { (p.float_or("sun_scale", 1.0) * scale) as f32 },
+            sun_aperture: p.positive_or("sun_aperture", 0.5358) as f32,
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Mitsuba's XML scene format in its 0.6, 2.x and 3.x spellings.
+//!
+//! Three steps: `document` reads the text (and included files) into a tree with source spans, parameters substituted and old
+//! spellings renamed; `props` looks at one element as a plugin with named properties, and knows which of them nobody asked
+//! for; the other files build what the plugins describe.
+
+mod bsdf;
+mod color;
+mod conductors;
+mod document;
+mod emitter;
+mod indices;
+mod objects;
+mod props;
+mod sensor;
+mod shape;
+mod spectrum;
+mod sun;
+mod texture;
+mod transform;
+mod values;
+
+use super::LoadOptions;
+use super::assets::Assets;
+use super::report::Report;
+use crate::scene::diag::Diagnostic;
+use crate::scene::{IntegratorDesc, SceneDesc};
+use objects::Builder;
+use props::Props;
+use std::cell::RefCell;
+use std::path::Path;
+
+pub(super) use transform::look_at;
+
+/// What may stand directly in a scene.
+const TOP_LEVEL: [&str; 10] = ["integrator", "sensor", "bsdf", "texture", "shape", "emitter", "medium", "volume", "ref", "spectrum"];
+
+/// Reads the file and everything it names.
+pub(super) fn load(path: &Path, options: &LoadOptions, report: &mut Report) -> Option<SceneDesc> {
+    let tree = document::load(path, &options.definitions, report)?;
+    let shared = RefCell::new(std::mem::take(report));
+    let mut builder = Builder::new(&tree, &shared, Assets::new(options.strict));
+    builder.scene();
+    let Builder { mut scene, assets, .. } = builder;
+    *report = shared.into_inner();
+    // Meshes are the expensive part: do not read them for a scene that is lost already.
+    if report.has_errors() {
+        assets.check_files_exist(report);
+    } else {
+        assets.decode(&mut scene, report);
+    }
+    Some(scene)
+}
+
+impl Builder<'_> {
+    fn scene(&mut self) {
+        let root = self.tree.root;
+        for &child in &self.tree.nodes[root].children {
+            if self.report.borrow().full() {
+                return;
+            }
+            let node = &self.tree.nodes[child];
+            match node.tag.as_str() {
+                "integrator" => self.integrator(child),
+                "sensor" => {
+                    if let Some(sensor) = self.sensor(child) {
+                        self.scene.sensors.push(sensor);
+                    }
+                }
+                "shape" => self.shape(child),
+                "emitter" => self.emitter(child),
+                // Built when something refers to them; those that nobody uses are still checked below.
+                "bsdf" | "texture" => {}
+                "medium" | "volume" => self.ignored_medium(child),
+                "ref" | "spectrum" => {}
+                tag => {
+                    let d = Diagnostic::error("scene::misplaced-element", format!("<{tag}> has no place directly in a scene")).at(node.span.clone());
+                    self.push(d.help(format!("expected one of: {}", TOP_LEVEL.join(", "))));
+                }
+            }
+        }
+        // Whatever was declared and not used is checked as well: a slip in it should not wait for its first use.
+        for &child in &self.tree.nodes[root].children {
+            if self.report.borrow().full() {
+                return;
+            }
+            if self.tree.nodes[child].tag == "bsdf" {
+                self.bsdf(child);
+            }
+        }
+    }
+
+    fn integrator(&mut self, node: usize) {
+        let tree = self.tree;
+        let element = &tree.nodes[node];
+        let Some(name) = Props::plugin_name(tree, node, self.report) else { return };
+        let params = element
+            .children
+            .iter()
+            .filter_map(|&child| {
+                let child = &tree.nodes[child];
+                let value = child.attr("value")?;
+                Some((child.attr("name")?.value.clone(), value.value.clone(), Some(value.span.clone())))
+            })
+            .collect();
+        self.scene.integrator = Some(IntegratorDesc { name: name.to_owned(), params, span: Some(element.span.clone()) });
+    }
+
+    fn ignored_medium(&mut self, node: usize) {
+        let node = &self.tree.nodes[node];
+        let d = Diagnostic::warning("scene::medium-ignored", format!("participating media are not supported: this <{}> is ignored", node.tag));
+        self.push(d.at(node.span.clone()));
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,186 @@
+//! Shapes, groups of shapes, and their instances.
+
+use super::document::OBJECT_TAGS;
+use super::objects::Builder;
+use super::props::Props;
+use super::spectrum::Purpose::Emission;
+use crate::load::assets::MeshSource;
+use crate::load::mesh::MeshOptions;
+use crate::load::primitives::Primitive;
+use crate::math::Frame;
+use crate::scene::diag::Diagnostic;
+use crate::scene::{AreaEmission, GroupDesc, GroupId, InstanceDesc, ShapeDesc};
+use glam::{DMat4, DVec3};
+
+const PLUGINS: [&str; 10] = ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance"];
+
+impl Builder<'_> {
+    /// A `<shape>` that stands in the scene itself.
+    pub(super) fn shape(&mut self, node: usize) {
+        let Some(p) = self.props(node) else { return };
+        match p.plugin {
+            // Built when an instance refers to it; checked even if none does.
+            "shapegroup" => {
+                self.group(node, node);
+            }
+            "instance" => {
+                if let Some(instance) = self.instance(&p) {
+                    self.scene.instances.push(instance);
+                }
+                p.finish();
+            }
+            _ => {
+                if let Some(shape) = self.surface(&p) {
+                    self.scene.shapes.push(shape);
+                }
+            }
+        }
+    }
+
+    fn instance(&mut self, p: &Props<'_>) -> Option<InstanceDesc> {
+        let to_world = p.transform("to_world").unwrap_or(DMat4::IDENTITY);
+        let &[from] = p.objects().as_slice() else {
+            p.error("scene::nested-shape", "an `instance` needs one reference to a `shapegroup`");
+            return None;
+        };
+        let object = self.resolve(from)?;
+        let group = self.group(object, from)?;
+        Some(InstanceDesc { group, to_world, span: Some(p.span()) })
+    }
+
+    fn group(&mut self, object: usize, from: usize) -> Option<GroupId> {
+        if let Some(done) = self.groups.get(&object) {
+            return *done;
+        }
+        let node = self.node(object);
+        if node.tag != "shape" || node.attr("type").is_none_or(|a| a.value != "shapegroup") {
+            let d = Diagnostic::error("scene::wrong-type", "an instance must refer to a <shape type=\"shapegroup\">");
+            self.push(d.at(self.node(from).span.clone()).label("expected a shapegroup"));
+            return None;
+        }
+        let built = self.guarded(object, from, |b| {
+            let p = b.props(object)?;
+            let mut group = GroupDesc::default();
+            for child in p.objects() {
+                let Some(child) = b.resolve(child) else { continue };
+                if b.node(child).tag != "shape" {
+                    let d = Diagnostic::error("scene::misplaced-element", format!("a <{}> has no place in a shapegroup", b.node(child).tag));
+                    b.push(d.at(b.node(child).span.clone()).label("expected a <shape>"));
+                    continue;
+                }
+                let Some(shape) = b.props(child) else { continue };
+                if matches!(shape.plugin, "shapegroup" | "instance") {
+                    shape.error("scene::nested-shape", format!("a shapegroup cannot hold a `{}`", shape.plugin));
+                    continue;
+                }
+                let Some(shape) = b.surface(&shape) else { continue };
+                if let Some(emission) = &shape.emission {
+                    let d = Diagnostic::error("scene::instanced-emitter", "a shape in a shapegroup cannot emit light");
+                    b.push(d.at(emission.span.clone()));
+                }
+                group.shapes.push(shape);
+            }
+            p.finish();
+            b.scene.groups.push(group);
+            Some(GroupId((b.scene.groups.len() - 1) as u32))
+        });
+        self.groups.insert(object, built);
+        built
+    }
+
+    /// Any shape that is a surface.
+    fn surface(&mut self, p: &Props<'_>) -> Option<ShapeDesc> {
+        let mut to_world = p.transform("to_world").unwrap_or(DMat4::IDENTITY);
+        let flip_normals = p.boolean_or("flip_normals", false);
+        let mut span = p.span();
+        let mut options = MeshOptions::default();
+        let source = match p.plugin {
+            "ply" | "obj" | "serialized" => {
+                options.face_normals = p.boolean_or("face_normals", false);
+                options.flip_v = p.boolean_or("flip_tex_coords", p.plugin == "obj");
+                p.ignore(&["max_smooth_angle", "collapse", "srgb"]);
+                let (path, place) = self.file(p, "filename")?;
+                span = place;
+                match p.plugin {
+                    "ply" => MeshSource::Ply(path),
+                    "obj" => MeshSource::Obj(path),
+                    _ => {
+                        let index = p.count("shape_index").unwrap_or(0);
+                        MeshSource::Serialized(path, index)
+                    }
+                }
+            }
+            "rectangle" => MeshSource::Primitive(Primitive::Rectangle),
+            "cube" => MeshSource::Primitive(Primitive::Cube),
+            "disk" => MeshSource::Primitive(Primitive::Disk),
+            "sphere" => {
+                let center = p.vector("center").unwrap_or(DVec3::ZERO);
+                let radius = p.positive_or("radius", 1.0);
+                to_world *= DMat4::from_translation(center) * DMat4::from_scale(DVec3::splat(radius));
+                MeshSource::Primitive(Primitive::Sphere)
+            }
+            "cylinder" => {
+                to_world *= cylinder_to_object(p)?;
+                MeshSource::Primitive(Primitive::Cylinder)
+            }
+            _ => {
+                self.unknown_plugin(p, &PLUGINS);
+                return None;
+            }
+        };
+        options.mirrored = to_world.determinant() < 0.0;
+
+        let mut bsdf = p.get_index("bsdf").and_then(|b| self.bsdf(b));
+        let mut emission = None;
+        p.ignore(&["silhouette_sampling_weight"]);
+        for object in p.objects() {
+            let Some(found) = self.resolve(object) else { continue };
+            match self.node(found).tag.as_str() {
+                "bsdf" => bsdf = self.bsdf(object),
+                "emitter" => emission = self.area_emission(found),
+                "medium" => {
+                    let d = Diagnostic::warning("scene::medium-ignored", "participating media are not supported: this one is ignored");
+                    self.push(d.at(self.node(object).span.clone()));
+                }
+                tag => {
+                    let d = Diagnostic::error("scene::misplaced-element", format!("a <{tag}> has no place in a <shape>"));
+                    self.push(d.at(self.node(object).span.clone()).label("expected <bsdf> or <emitter>"));
+                }
+            }
+        }
+        p.finish();
+        let mesh = self.assets.mesh(source, options, span);
+        let name = p.element().attr("id").map(|a| a.value.clone());
+        Some(ShapeDesc { mesh, to_world, bsdf, emission, flip_normals, name, span: Some(p.span()) })
+    }
+
+    fn area_emission(&mut self, node: usize) -> Option<AreaEmission> {
+        debug_assert!(OBJECT_TAGS.contains(&self.node(node).tag.as_str()));
+        let p = self.props(node)?;
+        if p.plugin != "area" {
+            let d = Diagnostic::error("scene::misplaced-element", format!("an emitter of type `{}` has no place in a <shape>", p.plugin));
+            self.push(d.at(p.element().span_of("type")).label("expected `area`"));
+            return None;
+        }
+        let radiance = self.color(&p, "radiance", 1.0, Emission);
+        p.ignore(&["sampling_weight"]);
+        p.finish();
+        Some(AreaEmission { radiance, span: Some(p.span()) })
+    }
+}
+
+/// The unit cylinder (around z from 0 to 1) → `p0` … `p1` with `radius`. The tangents are Mitsuba's: texture coordinates start there.
+fn cylinder_to_object(p: &Props<'_>) -> Option<DMat4> {
+    let (p0, p1) = (p.vector("p0").unwrap_or(DVec3::ZERO), p.vector("p1").unwrap_or(DVec3::Z));
+    let radius = p.positive_or("radius", 1.0);
+    let axis = p1 - p0;
+    let Some(direction) = axis.try_normalize() else {
+        p.error("scene::bad-value", "`p0` and `p1` of a cylinder are the same point");
+        return None;
+    };
+    let frame = Frame::from_normal(direction.as_vec3());
+    // Orthonormal in double precision.
+    let t = direction.cross(frame.s.as_dvec3()).normalize();
+    let s = t.cross(direction);
+    Some(DMat4::from_cols((s * radius).extend(0.0), (t * radius).extend(0.0), axis.extend(0.0), p0.extend(1.0)))
+}

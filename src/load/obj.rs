@@ -1,0 +1,188 @@
+//! Wavefront OBJ: polygons with texture coordinates and normals. Written by hand rather than taken from a library so that every
+//! mistake has its line, and so that nothing in a file can panic.
+
+use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
+use crate::math::Rgb;
+use crate::scene::MeshDesc;
+use glam::{Vec2, Vec3};
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// A corner of a face: indices of position, texture coordinates and normal, [`NONE`] where it has none.
+pub(super) type Corner = [u32; 3];
+/// No index.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// An OBJ file, faces as triangles in the order of the file.
+#[derive(Debug, Default)]
+pub(super) struct ObjFile {
+    pub positions: Vec<Vec3>,
+    /// As many as positions, or none.
+    pub colors: Vec<Rgb>,
+    pub uvs: Vec<Vec2>,
+    pub normals: Vec<Vec3>,
+    pub triangles: Vec<[Corner; 3]>,
+    /// `usemtl`: the first triangle of a material, its name, and the line.
+    pub materials: Vec<(usize, String, u64)>,
+    /// `mtllib`: file and line.
+    pub libraries: Vec<(String, u64)>,
+    pub skipped_faces: u64,
+}
+
+/// Reads an OBJ file as one mesh.
+pub(super) fn read_obj(path: &Path, options: MeshOptions) -> Result<LoadedMesh, MeshError> {
+    let file = parse(BufReader::new(File::open(path)?))?;
+    let mut mesh = mesh_of(&file, &file.triangles);
+    mesh::finish(&mut mesh, options);
+    mesh.name = path.display().to_string();
+    Ok(LoadedMesh { mesh, skipped_faces: file.skipped_faces })
+}
+
+/// Makes a mesh of some triangles of a file: one vertex for each combination of indices that occurs.
+pub(super) fn mesh_of<'a>(file: &ObjFile, triangles: impl IntoIterator<Item = &'a [Corner; 3]> + Clone) -> MeshDesc {
+    let all = || triangles.clone().into_iter().flatten();
+    let has_uvs = all().any(|c| c[1] != NONE);
+    // Normals on some corners only are of no use.
+    let has_normals = all().all(|c| c[2] != NONE) && all().next().is_some();
+    let mut mesh = MeshDesc::default();
+    let mut known: HashMap<Corner, u32> = HashMap::new();
+    for t in triangles {
+        mesh.triangles.push(t.map(|mut corner| {
+            if !has_normals {
+                corner[2] = NONE;
+            }
+            *known.entry(corner).or_insert_with(|| {
+                let [p, uv, n] = corner.map(|i| i as usize);
+                mesh.positions.push(file.positions[p]);
+                if let Some(color) = file.colors.get(p) {
+                    mesh.colors.push(*color);
+                }
+                if has_uvs {
+                    mesh.uvs.push(file.uvs.get(uv).copied().unwrap_or(Vec2::ZERO));
+                }
+                if has_normals {
+                    mesh.normals.push(file.normals[n]);
+                }
+                (mesh.positions.len() - 1) as u32
+            })
+        }));
+    }
+    mesh
+}
+
+/// Parses an OBJ stream.
+pub(super) fn parse(reader: impl BufRead) -> Result<ObjFile, MeshError> {
+    let mut file = ObjFile::default();
+    let mut corners = Vec::new();
+    for_each_line(reader, |number, line| {
+        statement(&mut file, &mut corners, number, line).map_err(|message| MeshError::new(Place::Line(number), message))
+    })?;
+    if file.colors.len() != file.positions.len() {
+        file.colors = Vec::new();
+    }
+    Ok(file)
+}
+
+/// Hands out lines with their numbers, comments cut off, lines that end in `\` joined with the next.
+pub(super) fn for_each_line(mut reader: impl BufRead, mut each: impl FnMut(u64, &str) -> Result<(), MeshError>) -> Result<(), MeshError> {
+    let (mut raw, mut joined, mut number) = (Vec::new(), String::new(), 0u64);
+    loop {
+        raw.clear();
+        if reader.read_until(b'\n', &mut raw)? == 0 {
+            break;
+        }
+        number += 1;
+        // Names in old files are in any encoding; numbers are ASCII.
+        let text = String::from_utf8_lossy(&raw);
+        let text = text.split('#').next().unwrap_or("").trim();
+        if let Some(text) = text.strip_suffix('\\') {
+            joined.push_str(text);
+            joined.push(' ');
+        } else if joined.is_empty() {
+            each(number, text)?;
+        } else {
+            joined.push_str(text);
+            each(number, &joined)?;
+            joined.clear();
+        }
+    }
+    if joined.is_empty() { Ok(()) } else { each(number, &joined) }
+}
+
+fn statement(file: &mut ObjFile, corners: &mut Vec<Corner>, number: u64, line: &str) -> Result<(), String> {
+    let (keyword, rest) = line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
+    match keyword {
+        "v" => {
+            let v: Vec<f32> = floats(rest, 3)?;
+            file.positions.push(Vec3::new(v[0], v[1], v[2]));
+            // x y z r g b: an extension that many exporters of scans write.
+            if v.len() >= 6 {
+                file.colors.push(Rgb::new(v[3], v[4], v[5]));
+            }
+        }
+        "vt" => {
+            let v = floats(rest, 1)?;
+            file.uvs.push(Vec2::new(v[0], v.get(1).copied().unwrap_or(0.0)));
+        }
+        "vn" => {
+            let v = floats(rest, 3)?;
+            file.normals.push(Vec3::new(v[0], v[1], v[2]));
+        }
+        "f" => {
+            corners.clear();
+            for word in rest.split_ascii_whitespace() {
+                corners.push(corner(file, word)?);
+            }
+            if corners.len() < 3 {
+                file.skipped_faces += 1;
+            }
+            for pair in corners.get(1..).unwrap_or(&[]).windows(2) {
+                file.triangles.push([corners[0], pair[0], pair[1]]);
+            }
+        }
+        "usemtl" => file.materials.push((file.triangles.len(), rest.trim().to_owned(), number)),
+        "mtllib" => file.libraries.push((rest.trim().to_owned(), number)),
+        // Groups, names, smoothing, lines and points, free-form surfaces' parameters: nothing to see or nothing to keep.
+        "" | "g" | "o" | "s" | "l" | "p" | "vp" | "mg" | "lod" | "shadow_obj" | "trace_obj" | "bevel" | "c_interp" | "d_interp" | "usemap" | "maplib" => {}
+        "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim" | "hole" | "scrv" | "sp" | "end" | "con" => {}
+        other => return Err(format!("unknown statement `{}`: not an OBJ file?", other.chars().take(40).collect::<String>())),
+    }
+    Ok(())
+}
+
+/// All numbers of a line, at least `least`.
+fn floats(text: &str, least: usize) -> Result<Vec<f32>, String> {
+    let all: Result<Vec<f32>, String> = text
+        .split_ascii_whitespace()
+        .map(|w| w.parse().ok().filter(|v: &f32| v.is_finite()).ok_or_else(|| format!("`{w}` is not a finite number")))
+        .collect();
+    let all = all?;
+    if all.len() < least { Err(format!("expected {least} numbers, found {}", all.len())) } else { Ok(all) }
+}
+
+/// `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1, or from the end if negative.
+fn corner(file: &ObjFile, word: &str) -> Result<Corner, String> {
+    let counts = [file.positions.len(), file.uvs.len(), file.normals.len()];
+    let names = ["vertex", "texture coordinate", "normal"];
+    let mut out = [NONE; 3];
+    for (i, part) in word.split('/').enumerate() {
+        if i > 2 {
+            return Err(format!("`{word}` is not a corner of a face: expected v, v/vt, v//vn or v/vt/vn"));
+        }
+        if part.is_empty() && i > 0 {
+            continue;
+        }
+        let given: i64 = part.parse().map_err(|_| format!("`{word}` is not a corner of a face: expected v, v/vt, v//vn or v/vt/vn"))?;
+        let index = if given < 0 { counts[i] as i64 + given } else { given - 1 };
+        if index < 0 || index >= counts[i] as i64 || index >= i64::from(NONE) {
+            return Err(format!("there is no {} {given}: {} are defined so far", names[i], counts[i]));
+        }
+        out[i] = index as u32;
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests;

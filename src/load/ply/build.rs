@@ -1,0 +1,139 @@
+//! Puts rows of a PLY file, however written, into the arrays of a mesh.
+
+use super::header::{Element, Kind, Scalar};
+use crate::image::buffer::srgb_to_linear;
+use crate::load::mesh::{LoadedMesh, MeshError, Place};
+use crate::math::Rgb;
+use crate::scene::MeshDesc;
+use glam::{Vec2, Vec3};
+
+/// Where in a row (as an index of its properties) the known vertex properties are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VertexLayout {
+    pub position: [usize; 3],
+    pub normal: Option<[usize; 3]>,
+    pub uv: Option<[usize; 2]>,
+    pub color: Option<[usize; 3]>,
+    /// Colours are bytes: sRGB.
+    pub color_is_srgb: bool,
+}
+
+impl VertexLayout {
+    /// Finds the known properties of the vertex element.
+    pub(super) fn of(element: &Element, normals_unwanted: bool) -> Result<VertexLayout, MeshError> {
+        let find = |name: &str| {
+            element.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::One(_)))
+        };
+        let three = |names: [&str; 3]| Some([find(names[0])?, find(names[1])?, find(names[2])?]);
+        let two = |names: [&str; 2]| Some([find(names[0])?, find(names[1])?]);
+        let position = three(["x", "y", "z"])
+            .ok_or_else(|| MeshError::new(Place::File, "the `vertex` element lacks one of the properties x, y, z"))?;
+        let color = three(["r", "g", "b"]).or_else(|| three(["red", "green", "blue"]));
+        Ok(VertexLayout {
+            position,
+            normal: if normals_unwanted { None } else { three(["nx", "ny", "nz"]) },
+            uv: [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]].into_iter().find_map(two),
+            color,
+            color_is_srgb: color.is_some_and(|c| element.properties[c[0]].kind == Kind::One(Scalar::U8)),
+        })
+    }
+}
+
+/// The index of the face element's list of vertices.
+pub(super) fn index_property(element: &Element) -> Result<usize, MeshError> {
+    let found = element.properties.iter().position(|p| {
+        (p.name == "vertex_indices" || p.name == "vertex_index") && matches!(p.kind, Kind::List { item, .. } if item.is_integer())
+    });
+    found.ok_or_else(|| MeshError::new(Place::File, "the `face` element lacks an integer list `vertex_indices` (or `vertex_index`)"))
+}
+
+/// A mesh in the making.
+#[derive(Debug, Default)]
+pub(super) struct Builder {
+    pub mesh: MeshDesc,
+    pub normals_unwanted: bool,
+    skipped_faces: u64,
+    /// Largest index seen, and the face that had it.
+    largest: Option<(u32, u64)>,
+}
+
+impl Builder {
+    pub(super) fn new(normals_unwanted: bool) -> Builder {
+        Builder { normals_unwanted, ..Builder::default() }
+    }
+
+    /// Prepares for `count` vertices; the caller has made sure that the file is long enough for them.
+    pub(super) fn reserve_vertices(&mut self, layout: &VertexLayout, count: u64) -> Result<(), MeshError> {
+        if count > u64::from(u32::MAX) {
+            return Err(MeshError::new(Place::File, "more than 2^32 vertices"));
+        }
+        let count = count as usize;
+        self.mesh.positions.reserve_exact(count);
+        if layout.normal.is_some() {
+            self.mesh.normals.reserve_exact(count);
+        }
+        if layout.uv.is_some() {
+            self.mesh.uvs.reserve_exact(count);
+        }
+        if layout.color.is_some() {
+            self.mesh.colors.reserve_exact(count);
+        }
+        Ok(())
+    }
+
+    /// Adds a vertex, its properties as numbers in the order of the header.
+    pub(super) fn vertex(&mut self, layout: &VertexLayout, row: &[f64]) {
+        let three = |i: [usize; 3]| Vec3::new(row[i[0]] as f32, row[i[1]] as f32, row[i[2]] as f32);
+        self.mesh.positions.push(three(layout.position));
+        if let Some(i) = layout.normal {
+            self.mesh.normals.push(three(i));
+        }
+        if let Some(i) = layout.uv {
+            self.mesh.uvs.push(Vec2::new(row[i[0]] as f32, row[i[1]] as f32));
+        }
+        if let Some(i) = layout.color {
+            let value = |v: f64| if layout.color_is_srgb { srgb_to_linear(v / 255.0) as f32 } else { v as f32 };
+            self.mesh.colors.push(Rgb::new(value(row[i[0]]), value(row[i[1]]), value(row[i[2]])));
+        }
+    }
+
+    /// Index of the first vertex from `first` on that is not finite.
+    pub(super) fn first_broken_vertex(&self, first: usize) -> Option<usize> {
+        let bad = |from: usize, all: &[Vec3]| all.get(from..)?.iter().position(|v| !v.is_finite()).map(|i| i + from);
+        let uv = self.mesh.uvs.get(first..).and_then(|v| v.iter().position(|v| !v.is_finite())).map(|i| i + first);
+        bad(first, &self.mesh.positions).or(uv)
+    }
+
+    /// Adds face number `face` as a fan of triangles.
+    pub(super) fn face(&mut self, face: u64, corners: &[u32]) {
+        if corners.len() < 3 {
+            self.skipped_faces += 1;
+            return;
+        }
+        for pair in corners[1..].windows(2) {
+            self.mesh.triangles.push([corners[0], pair[0], pair[1]]);
+        }
+        self.note_largest(corners.iter().copied().max().unwrap_or(0), face);
+    }
+
+    /// Remembers the largest index; [`Builder::finish`] compares it with the number of vertices, which may come after the faces.
+    pub(super) fn note_largest(&mut self, index: u32, face: u64) {
+        if self.largest.is_none_or(|(largest, _)| index > largest) {
+            self.largest = Some((index, face));
+        }
+    }
+
+    /// The mesh, its indices checked.
+    pub(super) fn finish(mut self) -> Result<LoadedMesh, MeshError> {
+        let vertices = self.mesh.positions.len();
+        if let Some((index, face)) = self.largest
+            && index as usize >= vertices
+        {
+            let index = index as i32;
+            return Err(MeshError::new(Place::File, format!("face {face} names vertex {index}, but there are {vertices} vertices")));
+        }
+        // Polygons grow the list by doubling: give back what is too much.
+        self.mesh.triangles.shrink_to_fit();
+        Ok(LoadedMesh { mesh: self.mesh, skipped_faces: self.skipped_faces })
+    }
+}

@@ -1,0 +1,48 @@
+//! Stanford PLY: ASCII and both binary byte orders, any order and type of properties, streamed.
+//!
+//! The file is never held as a whole: a chunk is read, converted into the mesh's own arrays, and forgotten. Counts in the header
+//! are believed only as far as the file is long enough for them, so that a broken header cannot ask for all memory.
+//!
+//! Known vertex properties: `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`, `texture_s texture_t`), `r g b` (or
+//! `red green blue`; eight-bit colours are taken as sRGB). Faces: `vertex_indices` or `vertex_index`; polygons become fans.
+
+mod ascii;
+mod binary;
+mod build;
+mod header;
+
+use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
+use build::Builder;
+use header::{Format, Header};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Reads a PLY file.
+pub(super) fn read_ply(path: &Path, options: MeshOptions) -> Result<LoadedMesh, MeshError> {
+    let file = File::open(path)?;
+    let size = file.metadata()?.len();
+    let mut loaded = parse_ply(file, size, options.face_normals)?;
+    mesh::finish(&mut loaded.mesh, options);
+    loaded.mesh.name = path.display().to_string();
+    Ok(loaded)
+}
+
+/// Parses a PLY stream of `size` bytes; without `normals_unwanted` the file's vertex normals are kept as they are.
+fn parse_ply(reader: impl Read + Send, size: u64, normals_unwanted: bool) -> Result<LoadedMesh, MeshError> {
+    let mut stream = binary::Stream::new(reader, size);
+    let header = Header::read(&mut stream)?;
+    let mut builder = Builder::new(normals_unwanted);
+    match header.format {
+        Format::Ascii => ascii::read_body(&header, &mut stream, &mut builder)?,
+        Format::BinaryLittle => binary::read_body::<binary::Little, _>(&header, &mut stream, &mut builder)?,
+        Format::BinaryBig => binary::read_body::<binary::Big, _>(&header, &mut stream, &mut builder)?,
+    }
+    if !header.elements.iter().any(|e| e.name == "vertex") {
+        return Err(MeshError::new(Place::File, "the header declares no `vertex` element"));
+    }
+    builder.finish()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,55 @@
+//! Collects diagnostics while loading, and stops collecting when a file is hopeless.
+
+use crate::scene::Severity;
+use crate::scene::diag::{Diagnostic, Diagnostics};
+
+/// More errors than this help nobody.
+pub(super) const MAX_ERRORS: usize = 20;
+
+/// Diagnostics of one load.
+#[derive(Debug, Default)]
+pub(super) struct Report {
+    diagnostics: Diagnostics,
+    errors: usize,
+    io: bool,
+}
+
+impl Report {
+    pub(super) fn new() -> Report {
+        Report::default()
+    }
+
+    /// Adds a message; errors beyond the limit are counted only.
+    pub(super) fn push(&mut self, d: Diagnostic) {
+        if d.severity == Severity::Error {
+            self.errors += 1;
+            if self.errors > MAX_ERRORS {
+                return;
+            }
+        }
+        self.diagnostics.push(d);
+    }
+
+    /// Adds an error that comes from the file system.
+    pub(super) fn push_io(&mut self, d: Diagnostic) {
+        self.io |= d.severity == Severity::Error;
+        self.push(d);
+    }
+
+    pub(super) fn has_errors(&self) -> bool {
+        self.errors > 0
+    }
+
+    /// True when it is time to give up.
+    pub(super) fn full(&self) -> bool {
+        self.errors >= MAX_ERRORS
+    }
+
+    /// The messages, and whether the file system was at fault.
+    pub(super) fn finish(mut self) -> (Diagnostics, bool) {
+        if self.full() {
+            self.diagnostics.push(Diagnostic::note("load::too-many-errors", format!("stopped after {MAX_ERRORS} errors")));
+        }
+        (self.diagnostics, self.io)
+    }
+}
