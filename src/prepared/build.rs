@@ -2,8 +2,8 @@
 
 use super::{Features, MeshShading, PreparedScene};
 use crate::emit::{
-    Camera, DirectionalLight, EmitError, Environment, EnvironmentLight, Light, LightSet, PixelFilter, PointLight,
-    RadianceTexture, SpotLight, TriangleEmission, TriangleLight, triangle::TexturedEmission,
+    Camera, DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, LightSet, PixelFilter,
+    PointLight, RadianceTexture, SpotLight, SunSky, SunSkyParams, TexturedEmission, TriangleEmission, TriangleLight,
 };
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 use crate::ray::{Backend, Geometry, Instance, MeshBuffers, QueryError, VertexBuffer};
@@ -409,10 +409,22 @@ fn emitter_lights(
 }
 
 /// What surrounds the scene.
-fn surroundings(kind: &EmitterKind, _images: &[ImageDesc]) -> Result<Environment, EmitError> {
+fn surroundings(kind: &EmitterKind, images: &[ImageDesc]) -> Result<Environment, EmitError> {
     Ok(match kind {
+        EmitterKind::Envmap { image, scale, to_world } => match images.get(image.index()) {
+            Some(desc) => Environment::Map(Box::new(EnvMap::new(&desc.image, *scale, *to_world)?)),
+            None => Environment::Constant(Rgb::BLACK),
+        },
+        &EmitterKind::SunSky { to_world, sun_direction, turbidity, albedo, sky_scale, sun_scale, sun_aperture } => {
+            let params =
+                SunSkyParams { to_world, sun_direction, turbidity, albedo, sky_scale, sun_scale, sun_aperture };
+            Environment::SunSky(Box::new(SunSky::new(&params)?))
+        }
         EmitterKind::Constant { radiance } => Environment::Constant(*radiance),
-        _ => Environment::Constant(Rgb::BLACK),
+        // Lights at a place do not surround the scene.
+        EmitterKind::Point { .. } | EmitterKind::Spot { .. } | EmitterKind::Directional { .. } => {
+            Environment::Constant(Rgb::BLACK)
+        }
     })
 }
 

@@ -33,7 +33,8 @@ impl<'t> Props<'t> {
         let element = &tree.nodes[node];
         let found = element.attr("type").map(|a| a.value.as_str());
         if found.is_none() {
-            let d = Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `type`", element.tag));
+            let d =
+                Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `type`", element.tag));
             report.borrow_mut().push(d.at(element.span.clone()));
         }
         found
@@ -48,7 +49,10 @@ impl<'t> Props<'t> {
             let element = &tree.nodes[child];
             let name = element.attr("name").map(|a| a.value.clone());
             if name.is_none() && element.tag != "ref" && !OBJECT_TAGS.contains(&element.tag.as_str()) {
-                let d = Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `name`", element.tag));
+                let d = Diagnostic::error(
+                    "scene::missing-attribute",
+                    format!("<{}> needs the attribute `name`", element.tag),
+                );
                 report.borrow_mut().push(d.at(element.span.clone()));
                 continue;
             }
@@ -119,12 +123,14 @@ impl<'t> Props<'t> {
     /// Reports that a property's element is of the wrong kind.
     pub(super) fn wrong_type(&self, node: &Node, expected: &str) {
         let name = node.attr("name").map_or("", |a| a.value.as_str());
-        let d = Diagnostic::error("scene::wrong-type", format!("`{name}` is a <{}>, but {expected} is expected", node.tag));
+        let d =
+            Diagnostic::error("scene::wrong-type", format!("`{name}` is a <{}>, but {expected} is expected", node.tag));
         self.report.borrow_mut().push(d.at(node.span.clone()).label(format!("expected {expected}")));
     }
 
     pub(super) fn bad_value(&self, node: &Node, attr: &str, message: String, expected: &str) {
-        let d = Diagnostic::error("scene::bad-value", message).at(node.span_of(attr)).label(format!("expected {expected}"));
+        let d =
+            Diagnostic::error("scene::bad-value", message).at(node.span_of(attr)).label(format!("expected {expected}"));
         self.report.borrow_mut().push(d);
     }
 
@@ -132,7 +138,8 @@ impl<'t> Props<'t> {
     pub(super) fn value_of(&self, node: &'t Node) -> Option<&'t str> {
         let found = node.attr("value");
         if found.is_none() {
-            let d = Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `value`", node.tag));
+            let d =
+                Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `value`", node.tag));
             self.report.borrow_mut().push(d.at(node.span.clone()));
         }
         found.map(|a| a.value.as_str())
@@ -172,7 +179,9 @@ impl<'t> Props<'t> {
             return None;
         }
         let text = self.value_of(node)?.trim();
-        text.parse().map_err(|_| self.bad_value(node, "value", format!("`{text}` is not a whole number"), "a whole number")).ok()
+        text.parse()
+            .map_err(|_| self.bad_value(node, "value", format!("`{text}` is not a whole number"), "a whole number"))
+            .ok()
     }
 
     /// A whole number of 0 … 2^32 − 1.
@@ -221,7 +230,12 @@ impl<'t> Props<'t> {
         }
         let words: Vec<&str> = choices.iter().map(|(w, _)| *w).collect();
         if let Some(node) = self.get(name) {
-            self.bad_value(node, "value", format!("`{text}` is not a value of `{name}`"), &format!("one of: {}", words.join(", ")));
+            self.bad_value(
+                node,
+                "value",
+                format!("`{text}` is not a value of `{name}`"),
+                &format!("one of: {}", words.join(", ")),
+            );
         }
         default
     }
@@ -264,8 +278,11 @@ impl<'t> Props<'t> {
             let node = &self.tree.nodes[item.node];
             let name = item.name.as_deref().unwrap_or("");
             let what = if name.is_empty() { format!("<{}>", node.tag) } else { format!("property `{name}`") };
-            let mut d = Diagnostic::warning("scene::unknown-property", format!("the plugin `{}` knows no {what}: ignored", self.plugin))
-                .at(node.span_of("name"));
+            let mut d = Diagnostic::warning(
+                "scene::unknown-property",
+                format!("the plugin `{}` knows no {what}: ignored", self.plugin),
+            )
+            .at(node.span_of("name"));
             if let Some(near) = nearest(name, asked.iter().copied()) {
                 d = d.label(format!("did you mean `{near}`?"));
             }
@@ -287,7 +304,10 @@ fn check_attributes(node: &Node, report: &RefCell<Report>) {
         _ => &["type", "id", "name", "version"],
     };
     for attr in node.attrs.iter().filter(|a| !known.contains(&a.name.as_str())) {
-        let mut d = Diagnostic::warning("scene::unknown-attribute", format!("<{}> has no attribute `{}`: ignored", node.tag, attr.name));
+        let mut d = Diagnostic::warning(
+            "scene::unknown-attribute",
+            format!("<{}> has no attribute `{}`: ignored", node.tag, attr.name),
+        );
         d = d.at(attr.span.clone());
         if let Some(near) = nearest(&attr.name, known.iter().copied()) {
             d = d.label(format!("did you mean `{near}`?"));
