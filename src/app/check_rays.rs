@@ -35,24 +35,24 @@ pub(crate) fn run(args: &CheckRaysArgs) -> Result<(), Failure> {
     check(Backend::Brute, args.rays.min(affordable))?;
 
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&rows).map_err(Failure::io)?);
+        out!("{}", serde_json::to_string_pretty(&rows).map_err(Failure::io)?);
     } else {
         for (name, a) in &rows {
-            println!("{name}");
-            println!("  rays            {:>9}, both hit {}", a.rays, a.both_hit);
-            println!("  hit or miss     {:>9}  one met something, the other nothing", a.hit_or_miss);
-            println!("  other surface   {:>9}  another triangle at another distance", a.other_surface);
-            println!(
+            out!("{name}");
+            out!("  rays            {:>9}, both hit {}", a.rays, a.both_hit);
+            out!("  hit or miss     {:>9}  one met something, the other nothing", a.hit_or_miss);
+            out!("  other surface   {:>9}  another triangle at another distance", a.other_surface);
+            out!(
                 "  distance        {:>9}  same triangle, distance differs by more than {DISTANCE_TOLERANCE:e}",
                 a.distance
             );
-            println!(
+            out!(
                 "  ties            {:>9}  another triangle at the same distance: shared edges, coplanar surfaces",
                 a.ties
             );
-            println!("  occlusion       {:>9}  of {} segments", a.occlusion, a.segments);
-            println!("  packets         {:>9}  packet and single query of one backend differ", a.packet);
-            println!("  disagreement    {:>9.2e}  ties apart", a.disagreement());
+            out!("  occlusion       {:>9}  of {} segments", a.occlusion, a.segments);
+            out!("  packets         {:>9}  packet and single query of one backend differ", a.packet);
+            out!("  disagreement    {:>9.2e}  ties apart", a.disagreement());
         }
     }
     let worst = rows.values().map(Agreement::disagreement).fold(0.0, f64::max);

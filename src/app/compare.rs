@@ -13,7 +13,7 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
     };
     let report = compare(&read(&args.image)?, &read(&args.reference)?).map_err(Failure::input)?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&report).map_err(Failure::io)?);
+        out!("{}", serde_json::to_string_pretty(&report).map_err(Failure::io)?);
         return Ok(());
     }
     // d: difference of a channel; r: the reference's channel; means over pixels and channels.
@@ -28,8 +28,8 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
         ("HDR-FLIP", report.hdr_flip, "worst of the exposures"),
         ("mean ratio", report.mean_ratio, "mean image / mean reference"),
     ] {
-        println!("{name:16}{value:<14.6e}{formula}");
+        out!("{name:16}{value:<14.6e}{formula}");
     }
-    println!("{:16}{:<14}pixels left out", "non-finite", report.non_finite);
+    out!("{:16}{:<14}pixels left out", "non-finite", report.non_finite);
     Ok(())
 }

@@ -61,19 +61,19 @@ impl Config {
 
     /// As lines of `key = value`.
     pub fn print(&self, args: &RenderArgs) {
-        println!("scene = {}", args.scene.scene.display());
-        println!("integrator = {}", self.spec.name);
+        out!("scene = {}", args.scene.scene.display());
+        out!("integrator = {}", self.spec.name);
         for (key, value) in self.params.pairs() {
-            println!("{key} = {value}");
+            out!("{key} = {value}");
         }
         if let Some(n) = self.budget.iterations {
-            println!("spp = {n}");
+            out!("spp = {n}");
         }
         if let Some(t) = self.budget.time {
-            println!("time = {}s", t.as_secs_f64());
+            out!("time = {}s", t.as_secs_f64());
         }
-        println!("seed = {}", args.seed);
-        println!("threads = {}", self.threads);
+        out!("seed = {}", args.seed);
+        out!("threads = {}", self.threads);
     }
 }
 

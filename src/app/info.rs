@@ -15,19 +15,19 @@ fn mib(bytes: usize) -> String {
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let (desc, mut diagnostics) = report::load(&args.scene, false)?;
     let said = diagnostics.list.len();
-    println!("scene       {}", args.scene.scene.display());
+    out!("scene       {}", args.scene.scene.display());
     if let Some(sensor) = desc.sensors.first() {
         let film = &sensor.film;
         let lens = if sensor.aperture_radius > 0.0 { "thin lens" } else { "pinhole" };
-        println!("camera      {lens}, field of view {:.2} degrees, film {} x {}", sensor.fov, film.width, film.height);
-        println!("filter      {:?}", film.filter);
+        out!("camera      {lens}, field of view {:.2} degrees, film {} x {}", sensor.fov, film.width, film.height);
+        out!("filter      {:?}", film.filter);
     }
     if let Some(block) = &desc.integrator {
         let params: Vec<String> = block.params.iter().map(|(k, v, _)| format!("{k}={v}")).collect();
-        println!("integrator  {} {}", block.name, params.join(" "));
+        out!("integrator  {} {}", block.name, params.join(" "));
     }
-    println!("materials   {}", desc.bsdfs.len());
-    println!("textures    {}", desc.textures.len());
+    out!("materials   {}", desc.bsdfs.len());
+    out!("textures    {}", desc.textures.len());
     for image in &desc.images {
         let space = match image.image.pixels {
             Pixels::Srgb8(_) => "sRGB, 8 bit",
@@ -35,7 +35,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
             Pixels::F32(_) => "linear, float",
         };
         let i = &image.image;
-        println!(
+        out!(
             "  {}  {} x {} x {}, {space}, {}",
             image.path.display(),
             i.width,
@@ -55,34 +55,34 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     report::print(&diagnostics);
     let scene = prepared.map_err(Failure::input)?;
     let shading: usize = scene.meshes.iter().map(crate::prepared::MeshShading::bytes).sum();
-    println!("meshes      {}", scene.geometry.meshes.len());
-    println!("instances   {}", scene.geometry.instances.len());
-    println!(
+    out!("meshes      {}", scene.geometry.meshes.len());
+    out!("instances   {}", scene.geometry.instances.len());
+    out!(
         "triangles   {} ({} with vertex data)",
         scene.geometry.triangle_count(),
         mib(scene.geometry.bytes() + shading)
     );
-    println!("lights      {} (every emitting triangle is one)", scene.lights.len());
-    println!(
+    out!("lights      {} (every emitting triangle is one)", scene.lights.len());
+    out!(
         "radius      {:.4}, centre {:.4} {:.4} {:.4}",
         scene.radius, scene.centre.x, scene.centre.y, scene.centre.z
     );
-    println!("features    {}", scene.features.names().join(", "));
-    println!("backend     {}, tree built in {:.3} s", scene.query.describe(), scene.tree_seconds);
+    out!("features    {}", scene.features.names().join(", "));
+    out!("backend     {}, tree built in {:.3} s", scene.query.describe(), scene.tree_seconds);
     Ok(())
 }
 
 pub(crate) fn list(args: &ListArgs) -> Result<(), Failure> {
     let Some(name) = &args.integrator else {
         for spec in integrators::REGISTRY {
-            println!("{:12}{}", spec.name, spec.about);
+            out!("{:12}{}", spec.name, spec.about);
         }
         return Ok(());
     };
     let spec = integrators::find(name).ok_or_else(|| Failure::Input(format!("unknown integrator \"{name}\"")))?;
-    println!("{}: {}\n", spec.name, spec.about);
+    out!("{}: {}\n", spec.name, spec.about);
     for p in spec.params {
-        println!("  {:16}{}\n  {:16}({})", p.name, p.about, "", p.default.describe());
+        out!("  {:16}{}\n  {:16}({})", p.name, p.about, "", p.default.describe());
     }
     Ok(())
 }

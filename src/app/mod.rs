@@ -1,5 +1,21 @@
 //! The command line; the only room that prints.
 
+/// Prints a line of results. A reader that has gone away (`| head`) is not an error.
+macro_rules! out {
+    ($($text:tt)*) => {{
+        use std::io::Write;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
+/// Prints a line to standard error, in the same way.
+macro_rules! note {
+    ($($text:tt)*) => {{
+        use std::io::Write;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
 mod check_rays;
 mod cli;
 mod compare;
@@ -66,9 +82,9 @@ pub fn main() -> ExitCode {
         Err(failure) => {
             match &failure {
                 Failure::Input(text) | Failure::Io(text) if text.is_empty() => {}
-                Failure::Input(text) | Failure::Io(text) => eprintln!("error: {text}"),
-                Failure::NonFinite(n) => eprintln!("error: {n} samples were not finite (--strict)"),
-                Failure::Interrupted => eprintln!("interrupted"),
+                Failure::Input(text) | Failure::Io(text) => note!("error: {text}"),
+                Failure::NonFinite(n) => note!("error: {n} samples were not finite (--strict)"),
+                Failure::Interrupted => note!("interrupted"),
             }
             ExitCode::from(failure.exit_code())
         }

@@ -202,7 +202,7 @@ fn write_json(path: &Path, stats: &RenderStats) -> Result<(), Failure> {
 }
 
 fn summarise(stats: &RenderStats, outputs: &[PathBuf]) {
-    eprintln!(
+    note!(
         "{} samples per pixel in {:.2} s ({:.2} Mrays/s, {:.0} % of the time in ray queries, {})",
         stats.iterations,
         stats.wall_s,
@@ -211,15 +211,15 @@ fn summarise(stats: &RenderStats, outputs: &[PathBuf]) {
         stats.backend
     );
     if stats.non_finite > 0 {
-        eprintln!("warning: {} samples were not finite and were left out; the first:", stats.non_finite);
+        note!("warning: {} samples were not finite and were left out; the first:", stats.non_finite);
         for p in &stats.non_finite_at {
-            eprintln!("  pixel {},{} iteration {}", p.x, p.y, p.iteration);
+            note!("  pixel {},{} iteration {}", p.x, p.y, p.iteration);
         }
     }
     for path in outputs {
-        eprintln!("wrote {}", path.display());
+        note!("wrote {}", path.display());
     }
     if outputs.is_empty() {
-        eprintln!("no output file was asked for (-o FILE)");
+        note!("no output file was asked for (-o FILE)");
     }
 }

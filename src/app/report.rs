@@ -24,9 +24,9 @@ pub(crate) fn print(diagnostics: &Diagnostics) {
     let plural = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
     match (errors, warnings) {
         (0, 0) => {}
-        (0, w) => eprintln!("{}", plural(w, "warning")),
-        (e, 0) => eprintln!("{}", plural(e, "error")),
-        (e, w) => eprintln!("{}, {}", plural(e, "error"), plural(w, "warning")),
+        (0, w) => note!("{}", plural(w, "warning")),
+        (e, 0) => note!("{}", plural(e, "error")),
+        (e, w) => note!("{}, {}", plural(e, "error"), plural(w, "warning")),
     }
 }
 
@@ -52,7 +52,7 @@ fn print_one(out: &mut StandardStream, d: &Diagnostic) {
     let file = SimpleFile::new(name, text);
     // A message that cannot be drawn is still said.
     if term::emit_to_write_style(out, &term::Config::default(), &file, &shown).is_err() {
-        eprintln!("{}: {}", d.code, d.message);
+        note!("{}: {}", d.code, d.message);
     }
 }
 
