@@ -110,7 +110,7 @@ fn the_tree_follows_the_distance() {
     let variance = |pmf: &dyn Fn(LightId) -> f64| second(pmf) / (sum * sum) - 1.0;
     let by_power = variance(&|id| f64::from(set.pmf(id).0));
     let by_tree = variance(&|id| f64::from(set.pmf_from(p, Some(n), id).0));
-    assert!(by_tree < 0.02 * by_power, "{by_tree} {by_power}");
+    assert!(by_tree < 0.1 * by_power, "{by_tree} {by_power}");
 }
 
 #[test]
