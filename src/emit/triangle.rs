@@ -1,6 +1,6 @@
 //! An emitting triangle.
 //!
-//! As seen from a reference point it is sampled uniformly in solid angle when it is large (see [`SPHERICAL_FROM`]), and uniformly in
+//! As seen from a reference point it is sampled uniformly in solid angle when it is large (see `SPHERICAL_FROM`), and uniformly in
 //! area when it is small and the two hardly differ. Which of them is a function of the point and the triangle alone.
 
 use super::sample::{DirectSample, EmissionSample, LightEnd};

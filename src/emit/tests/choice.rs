@@ -77,17 +77,24 @@ fn lights_without_probability_are_dark() {
     let set = with_infinite();
     let mut rng = rng(100);
     let mut dark = 0;
-    for (p, n) in places() {
+    for i in 0..2000 {
+        // Half of the points are close to a light, where it is seen under a large angle.
+        let near = Vec3::new(rng.next_f32(), rng.next_f32(), rng.next_f32()) * 6.0 - 3.0;
+        let p = match set.get(LightId(rng.next_u64() as u32 % 60)) {
+            Light::Triangle(t) if i % 2 == 0 => t.corners()[i % 3] + random_direction(&mut rng) * 0.3,
+            _ => near,
+        };
+        let n = (i % 3 > 0).then(|| random_direction(&mut rng));
         for (id, light) in set.iter().filter(|(id, _)| set.pmf_from(p, n, *id).0 == 0.0) {
             dark += 1;
-            for _ in 0..50 {
+            for _ in 0..4 {
                 if let Some(s) = light.sample_direct(p, pair(&mut rng)) {
-                    assert!(n.is_some_and(|n| n.dot(s.wi) <= 1e-4), "light {id:?} shines on {p}");
+                    assert!(n.is_some_and(|n| n.dot(s.wi) <= 1e-3), "light {id:?} shines on {p}");
                 }
             }
         }
     }
-    assert!(dark > 50, "{dark}");
+    assert!(dark > 10_000, "{dark}");
 }
 
 /// What the tree is for: less variance than choice by power among many lights spread over a large room.
