@@ -180,7 +180,7 @@ fn directions_to_the_sun_are_uniform() {
         let chord2 = (dir.as_dvec3() - towards).length_squared();
         observed[((chord2 / max * 10.0) as usize).min(9)] += 1.0;
     }
-    let p = chi2_p_value(&observed, &vec![f64::from(n) / 10.0; 10]);
+    let p = chi2_p_value(&observed, &[f64::from(n) / 10.0; 10]);
     assert!(p > significance(1), "p = {p}");
 }
 
