@@ -20,6 +20,9 @@ mod sun_table;
 pub mod sunsky;
 pub mod triangle;
 
+#[cfg(test)]
+mod tests;
+
 pub use camera::{Camera, CameraRay, LensSample};
 pub use delta::{DirectionalLight, PointLight, SpotLight};
 pub use environment::{Environment, EnvironmentLight};
