@@ -5,6 +5,7 @@
 use super::buffer::{Image, Pixels};
 use super::read::{ImageFault, check_size};
 use exr::block::reader::ChunksReader;
+use exr::compression::Compression;
 use exr::math::Vec2;
 use exr::meta::attribute::{ChannelList, SampleType};
 use std::io::Cursor;
@@ -46,7 +47,10 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Image, ImageFault> {
 
     let Vec2(width, height) = header.layer_size;
     let bytes_per_pixel: usize = header.channels.list.iter().map(|c| c.sample_type.bytes_per_sample()).sum();
-    check_size(width as u64, height as u64, bytes_per_pixel as u64, bytes.len() as u64)?;
+    // DWA stores a constant block of 8 x 8 pixels as one number, and those numbers are deflated.
+    let dwa = matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_));
+    let file_bytes = bytes.len() as u64 * if dwa { 64 } else { 1 };
+    check_size(width as u64, height as u64, bytes_per_pixel as u64, file_bytes)?;
     let channels = wanted.len();
     check_size(width as u64, height as u64, 4 * channels as u64, u64::MAX)?;
     // Of each channel of the file: its place in the picture.

@@ -2,7 +2,7 @@
 //!
 //! LDR-ꟻLIP: Andersson et al., "ꟻLIP: A Difference Evaluator for Alternating Images", HPG 2020. HDR-ꟻLIP: Andersson et al.,
 //! "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics Short Papers 2021: the largest LDR-ꟻLIP over a
-//! range of exposures. Section and equation numbers below are those of the 2020 paper unless the year says otherwise.
+//! range of exposures.
 
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -10,18 +10,18 @@ use std::f64::consts::PI;
 /// Linear Rec. 709 colour.
 type Colour = [f64; 3];
 
-/// Pixels per degree of the papers' default viewer: 0.7 m from a display 0.7 m wide with 3840 pixels in a row (§6).
+/// Pixels per degree of the papers' default viewer: 0.7 m from a display 0.7 m wide with 3840 pixels in a row.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
 
-/// Exponent of the colour difference, and the knee (p_c, p_t) of its remapping (§4.1.3).
+/// Exponent of the colour difference, and the knee (p_c, p_t) of its remapping.
 const Q_C: f64 = 0.7;
 const P_C: f64 = 0.4;
 const P_T: f64 = 0.95;
-/// Width of the feature detectors in degrees, and exponent of the feature difference (§4.2).
+/// Width of the feature detectors in degrees, and exponent of the feature difference.
 const FEATURE_WIDTH: f64 = 0.082;
 const Q_F: f64 = 0.5;
 
-/// Contrast sensitivity as sums of Gaussians (table 1): weights a and widths b of the achromatic, red-green and blue-yellow
+/// Contrast sensitivity as sums of Gaussians: weights a and widths b of the achromatic, red-green and blue-yellow
 /// channels.
 const SENSITIVITY: [[(f64, f64); 2]; 3] =
     [[(1.0, 0.0047), (0.0, 1e-5)], [(1.0, 0.0053), (0.0, 1e-5)], [(34.1, 0.04), (13.5, 0.025)]];
@@ -63,7 +63,7 @@ fn clip(v: f64) -> f64 {
 }
 
 /// Coefficients of Narkowicz's fit of the ACES curve, (k0 x² + k1 x + k2) / (k3 x² + k4 x + k5), with its exposure factor 0.6
-/// multiplied in (2021, §3).
+/// multiplied in (2021 paper).
 const ACES: [f64; 6] = [0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14];
 
 fn aces(x: f64) -> f64 {
@@ -73,7 +73,7 @@ fn aces(x: f64) -> f64 {
 }
 
 /// Exposures in stops that bring the reference's brightest and its median luminance to 85 % of the tone mapper's range, and
-/// steps of at most one stop between them (2021, §3, eqs. 3 and 4).
+/// steps of at most one stop between them (2021 paper).
 fn exposures(reference: &[Colour]) -> Vec<f64> {
     const TARGET: f64 = 0.85;
     let [k0, k1, k2, k3, k4, k5] = ACES;
@@ -107,18 +107,18 @@ fn differences(image: Vec<Colour>, reference: Vec<Colour>, width: usize) -> Vec<
         let edge = (feature_a[i].edge - feature_b[i].edge).abs();
         let point = (feature_a[i].point - feature_b[i].point).abs();
         let feature = (edge.max(point) * std::f64::consts::FRAC_1_SQRT_2).powf(Q_F);
-        colour.powf(1.0 - feature) // eq. 20
+        colour.powf(1.0 - feature)
     };
     (0..colour_a.len()).into_par_iter().map(difference).collect()
 }
 
-/// Two linear pieces: small differences take up [0, p_t], large ones the rest (eq. 15).
+/// Two linear pieces: small differences take up [0, p_t], large ones the rest.
 fn remap(difference: f64, largest: f64) -> f64 {
     let knee = P_C * largest;
     if difference < knee { P_T / knee * difference } else { P_T + (difference - knee) / (largest - knee) * (1.0 - P_T) }
 }
 
-/// What the eye still resolves, in Hunt-adjusted L*a*b* (§4.1.1 and §4.1.2).
+/// What the eye still resolves, in Hunt-adjusted L*a*b*.
 fn perceived(opponent: &[Colour], width: usize) -> Vec<Colour> {
     let widest = SENSITIVITY.iter().flatten().map(|&(_, b)| b).fold(0.0, f64::max);
     let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i64;
@@ -152,7 +152,7 @@ struct Feature {
     point: f64,
 }
 
-/// Gradient and second derivative of the achromatic channel by Gaussian derivatives (§4.2.1).
+/// Gradient and second derivative of the achromatic channel by Gaussian derivatives.
 fn features(opponent: &[Colour], width: usize) -> Vec<Feature> {
     let grey: Vec<f64> = opponent.iter().map(|p| (p[0] + 16.0) / 116.0).collect();
     let sigma = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
@@ -227,7 +227,7 @@ fn white() -> Colour {
     to_xyz([1.0; 3])
 }
 
-/// Linearised L*a*b*, in which filtering is meaningful (§4.1.1).
+/// Linearised L*a*b*, in which filtering is meaningful.
 fn to_ycxcz(xyz: Colour) -> Colour {
     let w = white();
     let [x, y, z] = [xyz[0] / w[0], xyz[1] / w[1], xyz[2] / w[2]];
@@ -240,7 +240,7 @@ fn from_ycxcz(c: Colour) -> Colour {
     [(y + c[1] / 500.0) * w[0], y * w[1], (y - c[2] / 200.0) * w[2]]
 }
 
-/// CIE L*a*b* with a* and b* scaled by lightness, as saturation fades in the dark (Hunt effect, eq. 12).
+/// CIE L*a*b* with a* and b* scaled by lightness, as saturation fades in the dark (Hunt effect).
 fn hunt_lab(rgb: Colour) -> Colour {
     const DELTA: f64 = 6.0 / 29.0;
     let f = |t: f64| if t > DELTA.powi(3) { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 };
@@ -250,7 +250,7 @@ fn hunt_lab(rgb: Colour) -> Colour {
     [lightness, 0.01 * lightness * 500.0 * (x - y), 0.01 * lightness * 200.0 * (y - z)]
 }
 
-/// City-block in lightness plus Euclidean in chroma (eq. 13).
+/// City-block in lightness plus Euclidean in chroma.
 fn hyab(a: Colour, b: Colour) -> f64 {
     (a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])
 }

@@ -80,8 +80,8 @@ impl ImageFault {
 /// Longest file taken, and most bytes a decoded picture may hold.
 const MAX_BYTES: u64 = 1 << 32;
 
-/// Deflate, the best compressor of the formats here, shrinks at most 1032 times; twice that, since an RGBE pixel or a
-/// half-float sample grows in decoding.
+/// How many times larger than its file a picture may be. Deflate shrinks at most 1032 times, JPEG needs a bit per block,
+/// which comes to 1365 times, and the pixels of all the formats at most triple when decoded.
 const MAX_EXPANSION: u64 = 1 << 12;
 
 /// Reads a picture. Eight-bit files stay eight-bit; everything else becomes linear floats, row 0 at the top.
@@ -164,9 +164,8 @@ fn decode_common(
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(fault)?;
     let (width, height) = decoder.dimensions();
-    // Progressive JPEG encodes a flat picture in next to nothing, but its sides are at most 65535 anyway.
-    let length = if format == ImageFormat::Jpeg { MAX_BYTES } else { bytes.len() as u64 };
-    check_size(width.into(), height.into(), u64::from(decoder.color_type().bytes_per_pixel()), length)?;
+    let pixel_bytes = u64::from(decoder.color_type().bytes_per_pixel());
+    check_size(width.into(), height.into(), pixel_bytes, bytes.len() as u64)?;
     let picture = DynamicImage::from_decoder(decoder).map_err(fault)?;
 
     let srgb = encoding != Encoding::Linear;
