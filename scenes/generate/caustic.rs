@@ -20,7 +20,7 @@ fn egg() -> Mesh {
     let n = 26;
     let profile: Vec<[f64; 2]> = (0..=n)
         .map(|i| std::f64::consts::PI * i as f64 / n as f64)
-        .map(|a| [if a < 3.14 { 0.028 * a.sin() * (1.0 + 0.13 * a.cos()) } else { 0.0 }, 0.0385 - 0.0385 * a.cos()])
+        .map(|a| [0.028 * a.sin() * (1.0 + 0.13 * a.cos()), 0.0385 - 0.0385 * a.cos()])
         .collect();
     lathe(&profile, 44)
 }

@@ -260,7 +260,7 @@ pub fn scene() -> Scene {
     for (i, p) in bulbs.iter().enumerate() {
         let r = hash(i as i64, 7, 13);
         let c = palette[if r < 0.72 { (r * 4.1) as usize } else { 3 + ((r - 0.72) * 10.7) as usize }.min(5)];
-        let strength = if i < lanterns.len() { 70.0 } else { 46.0 };
+        let strength = if i < lanterns.len() { 80.0 } else { 60.0 };
         s.place_lamp("bulb", c.map(|x| x * strength), at(p[0], p[1], p[2]));
     }
     // Iron bollards along the kerbs, close to the camera.
