@@ -8,7 +8,7 @@ use crate::texture::{self, Sky};
 
 /// A quilt over a bed: flat on top with quilted swellings and wrinkles, falling over the sides in soft waves.
 fn duvet(w: f64, length: f64, top: f64) -> Mesh {
-    patch(52, 40, |u, v| {
+    patch(48, 36, |u, v| {
         let x = 2.0 * u - 1.0;
         let half = w / 2.0;
         // Arc length across, bent down over a rounded edge.
@@ -41,7 +41,7 @@ pub fn scene() -> Scene {
         disc_radius: 1.0,
         clouds: 0.5,
     };
-    s.file("textures/sky.hdr", sky.picture(128).hdr());
+    s.file("textures/sky.hdr", sky.picture(96).hdr());
     s.file("textures/boards.png", texture::planks([0.5, 0.33, 0.2], [0.74, 0.54, 0.35], 5, 17).png());
     s.file("textures/rug.png", texture::carpet([0.5, 0.2, 0.18], [0.2, 0.24, 0.36], [0.8, 0.7, 0.52]).png());
     s.file("textures/landscape.png", texture::landscape(4).png());
@@ -92,7 +92,7 @@ pub fn scene() -> Scene {
             .map(|i| ((i % 12) as f64 * 30.0).to_radians())
             .map(|a| [x, 2.405 + 0.024 * a.sin(), 0.15 + 0.024 * a.cos()])
             .collect();
-        s.put("rail", "brass", side(tube(&ring, 6, |_| 0.003)));
+        s.put("rail", "brass", side(tube(&ring, 5, |_| 0.003)));
     }
     s.put("curtains", "curtain", side(curtain(0.98, [0.03, 2.38], 0.055, 0.15).at(0.82, 0.0, 0.15)));
     s.put("curtains", "curtain", side(curtain(1.02, [0.03, 2.38], 0.055, 0.15).at(2.36, 0.0, 0.15)));
@@ -160,7 +160,7 @@ pub fn scene() -> Scene {
         }
         let mut p = vec![[0.0, 0.0], [0.06, 0.0]];
         p.extend(curve(&[[0.062, 0.01], [0.09, 0.1], [0.05, 0.2], [0.016, 0.24], [0.016, 0.28]], 5));
-        s.put("lamp-feet", "ceramic", lathe(&p, 28).at(x, 0.55, -1.9));
+        s.put("lamp-feet", "ceramic", lathe(&p, 20).at(x, 0.55, -1.9));
         let shade = [[0.16, 0.26], [0.11, 0.46], [0.107, 0.46], [0.157, 0.26]];
         s.put("lamp-shades", "shade", lathe(&shade, 32).at(x, 0.55, -1.9));
         let n = if lit { 3 } else { 2 };

@@ -66,7 +66,7 @@ pub fn scene() -> Scene {
         disc_radius: 1.2,
         clouds: 0.7,
     };
-    s.file("textures/sky.hdr", sky.picture(128).hdr());
+    s.file("textures/sky.hdr", sky.picture(96).hdr());
     s.file("textures/tiles.png", texture::tiles([0.72, 0.7, 0.65], [0.24, 0.27, 0.29], [0.3, 0.29, 0.28], 9).png());
     s.file("textures/wood.png", texture::planks([0.26, 0.14, 0.08], [0.45, 0.27, 0.15], 5, 23).png());
     s.environment("textures/sky.hdr", 3.2);
@@ -176,7 +176,7 @@ pub fn scene() -> Scene {
     let mut p = vec![[0.0, 0.0], [0.026, 0.0]];
     p.extend(curve(&[[0.028, 0.002], [0.033, 0.06], [0.036, 0.12]], 5));
     p.extend(curve(&[[0.0345, 0.12], [0.0315, 0.06], [0.026, 0.015], [0.0, 0.012]], 5));
-    s.put("tumbler", "glass", lathe(&p, 36).at(0.235, y, 0.05));
+    s.put("tumbler", "glass", lathe(&p, 28).at(0.235, y, 0.05));
     let spoon = |u: f64, v: f64| {
         let (a, x) = (2.0 * v - 1.0, u);
         let half = 0.004 + 0.012 * (1.0 - ((x - 0.14) / 0.14).powi(2)).max(0.0).sqrt() * (x < 0.28) as u8 as f64;
@@ -201,7 +201,7 @@ pub fn scene() -> Scene {
         p.extend(curve(&[[0.04, 0.0], [0.04, 0.6 * tall], [0.014, 0.75 * tall], [0.014, tall]], 2));
         p.push([0.0, tall]);
         let name = if texture::hash(k, 5, 6) > 0.5 { "bottle-green" } else { "bottle-amber" };
-        s.put(name, name, lathe(&p, 12).at(3.27, 1.5 + 0.45 * (k % 2) as f64, -2.6 + 0.155 * k as f64));
+        s.put(name, name, lathe(&p, 10).at(3.27, 1.5 + 0.45 * (k % 2) as f64, -2.6 + 0.155 * k as f64));
     }
     let pendant = curve(&[[0.15, 0.0], [0.13, 0.06], [0.05, 0.13], [0.02, 0.16]], 4);
     let mut p: Vec<[f64; 2]> = pendant.iter().rev().map(|&[r, y]| [r - 0.004, y - 0.003]).collect();

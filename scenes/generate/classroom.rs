@@ -83,7 +83,7 @@ pub fn scene() -> Scene {
         disc_radius: 1.2,
         clouds: 0.8,
     };
-    s.file("textures/sky.hdr", sky.picture(128).hdr());
+    s.file("textures/sky.hdr", sky.picture(96).hdr());
     s.file("textures/parquet.png", texture::planks([0.55, 0.42, 0.29], [0.76, 0.63, 0.46], 6, 6).png());
     s.file("textures/board.png", board().png());
     s.environment("textures/sky.hdr", 2.2);

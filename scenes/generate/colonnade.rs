@@ -30,7 +30,7 @@ pub fn column(h: f64, r: f64) -> Mesh {
     p.extend([[r * 1.02, 1.2], [r * 0.97, 2.0], [r * 0.9, h - 0.5]]);
     p.extend(curve(&[[r * 1.0, h - 0.49], [r * 1.07, h - 0.46], [r * 1.0, h - 0.43]], 3));
     p.extend(curve(&[[r * 0.92, h - 0.42], [r * 0.97, h - 0.32], [r * 1.25, h - 0.18], [r * 1.6, h - 0.12]], 4));
-    lathe(&p, 28).and(block([-r * 1.65, 0.0, -r * 1.65], [r * 1.65, 0.16, r * 1.65], 0.012)).and(block(
+    lathe(&p, 24).and(block([-r * 1.65, 0.0, -r * 1.65], [r * 1.65, 0.16, r * 1.65], 0.012)).and(block(
         [-r * 1.7, h - 0.12, -r * 1.7],
         [r * 1.7, h, r * 1.7],
         0.015,
@@ -51,7 +51,7 @@ pub fn scene() -> Scene {
         disc_radius: 1.2,
         clouds: 0.6,
     };
-    s.file("textures/sky.hdr", sky.picture(128).hdr());
+    s.file("textures/sky.hdr", sky.picture(96).hdr());
     s.file("textures/tiles.png", texture::tiles([0.74, 0.62, 0.5], [0.52, 0.36, 0.29], [0.42, 0.38, 0.34], 4).png());
     s.file("textures/ashlar.png", texture::ashlar([0.8, 0.74, 0.63], 6, 5).png());
     s.environment("textures/sky.hdr", 1.3);
@@ -140,7 +140,7 @@ pub fn scene() -> Scene {
             let bump = 1.0 + 0.10 * texture::noise(9.0 * u, 6.0 * v, 9, 9, i as u64) * t.sin();
             v3(p.cos() * t.sin(), t.cos(), -p.sin() * t.sin()) * bump * size
         };
-        s.put("bushes", "leaf", patch(28, 16, bush).at(r + 1.1, 0.75, z));
+        s.put("bushes", "leaf", patch(22, 12, bush).at(r + 1.1, 0.75, z));
         let pot = [[0.0, -0.05], [0.2, -0.05], [0.28, 0.4], [0.31, 0.4], [0.31, 0.46], [0.25, 0.46], [0.0, 0.42]];
         s.put("pots", "clay", lathe(&pot, 24).at(r + 1.1, 0.0, z));
     }

@@ -9,14 +9,14 @@ use crate::texture;
 pub fn scene() -> Scene {
     let purpose = "A door ajar and a lamp in the next room: nearly all light is indirect and comes through the gap.";
     let mut s = Scene::new("door", purpose, 24, 1024);
-    s.camera([-0.35, 1.42, 4.05], [0.12, 1.08, 0.0], 58.0);
-    s.file("textures/planks.png", texture::planks([0.45, 0.3, 0.19], [0.72, 0.54, 0.36], 4, 3).png());
+    s.camera([-0.95, 1.45, 4.15], [0.3, 1.08, 0.0], 58.0);
+    s.file("textures/planks.png", texture::planks([0.56, 0.49, 0.41], [0.8, 0.73, 0.64], 4, 3).png());
     s.file("textures/landscape.png", texture::landscape(21).png());
-    s.matt("wall", [0.72, 0.69, 0.62]);
-    s.matt("far-wall", [0.78, 0.72, 0.6]);
-    s.matt("ceiling", [0.8, 0.79, 0.76]);
+    s.matt("wall", [0.77, 0.77, 0.76]);
+    s.matt("far-wall", [0.78, 0.775, 0.75]);
+    s.matt("ceiling", [0.8, 0.8, 0.79]);
     s.glossy_picture("boards", "textures/planks.png", [1.6, 0.7], 0.25);
-    s.glossy("paint", [0.76, 0.74, 0.69], 0.2);
+    s.glossy("paint", [0.77, 0.76, 0.74], 0.2);
     s.glossy("wood", [0.36, 0.19, 0.09], 0.2);
     s.glossy("gilt", [0.55, 0.4, 0.16], 0.2);
     s.matt_picture("landscape", "textures/landscape.png", [1.0, -1.0]);
@@ -53,8 +53,9 @@ pub fn scene() -> Scene {
     s.put("trim", "paint", casing(opening, [0.0, 2.06], [0.0, 0.025]));
     s.put("trim", "paint", casing(opening, [0.0, 2.06], [-0.175, -0.15]));
 
-    // Hinged on the right, ajar into this room.
-    let ajar = |m: crate::mesh::Mesh| m.scaled(-1.0, 1.0, 1.0).turned(40.0).at(opening[1] - 0.005, 0.008, -0.02);
+    // Hinged on the left, ajar into this room: the camera looks at the dark side of the leaf, past which the light falls
+    // on the wall to its right.
+    let ajar = |m: crate::mesh::Mesh| m.turned(-45.0).at(opening[0] + 0.005, 0.008, -0.03);
     s.put("door", "paint", ajar(door_leaf(0.88, 2.04)));
     s.put("handle", "brass", ajar(door_handle(0.88)));
 
@@ -75,8 +76,8 @@ pub fn scene() -> Scene {
     p.extend(shade.iter().rev().map(|&[r, y]| [r - 0.006, y + 0.004]));
     p.push([0.0, 1.59]);
     s.define("uplighter", lathe(&p, 28));
-    s.place("uplighter", "brass", at(1.3, 0.0, -1.5));
-    s.lamp("lamp", disc_up(0.09, 24).at(1.3, 1.64, -1.5), [30000.0, 24500.0, 17500.0]);
+    s.place("uplighter", "brass", at(-0.2, 0.0, -1.3));
+    s.lamp("lamp", disc_up(0.09, 24).at(-0.2, 1.64, -1.3), [30000.0, 28000.0, 25000.0]);
     s.define("chair-2", chair());
     s.place("chair-2", "wood", turned(-20.0, 1.7, 0.0, -2.9));
     s

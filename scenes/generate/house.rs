@@ -35,7 +35,7 @@ pub fn scene() -> Scene {
     s.file("textures/boards.png", texture::planks([0.42, 0.26, 0.15], [0.66, 0.46, 0.28], 5, 41).png());
     s.file("textures/rug.png", texture::carpet([0.22, 0.3, 0.36], [0.5, 0.2, 0.16], [0.78, 0.68, 0.5]).png());
     s.file("textures/landscape.png", texture::landscape(52).png());
-    s.constant([0.10, 0.16, 0.32]);
+    s.constant([0.45, 0.75, 1.5]);
     s.glossy_picture("boards", "textures/boards.png", [1.5, 0.6], 0.25);
     s.matt_picture("rug", "textures/rug.png", [1.0, 1.0]);
     s.matt_picture("landscape", "textures/landscape.png", [1.0, -1.0]);
@@ -78,7 +78,7 @@ pub fn scene() -> Scene {
     }
     s.put("outside", "outside", slab([-40.0, -0.5, -40.0], [-w - 0.3, -0.4, 40.0]));
     for (x, width) in [(1.72, 0.5), (5.93, 0.5), (3.55, 0.42), (4.13, 0.42)] {
-        s.put("curtains", "linen", side(curtain(width, [0.05, 2.5], 0.04, 0.12).at(x, 0.0, 0.12)));
+        s.put("curtains", "linen", side(curtain(width, [0.05, 2.5], 0.045, 0.16).at(x, 0.0, 0.12)));
     }
     s.put("curtain-rail", "brass", side(rod([1.6, 2.52, 0.12], [6.5, 2.52, 0.12], 0.014, 10)));
 
@@ -134,6 +134,9 @@ pub fn scene() -> Scene {
         let (y, z) = (rise * (k + 1) as f64, start - going * k as f64);
         s.put("treads", "oak", block([sx0 - 0.03, y - 0.035, z - going - 0.01], [sx1, y, z + 0.03], 0.008));
         s.put("risers", "white-paint", slab([sx0, (y - rise - 0.2).max(0.0), z - going], [sx1, y - 0.03, z]));
+        if k > 0 {
+            s.put("spandrel", "white-paint", slab([sx0 + 0.02, 0.0, z - going], [sx0 + 0.06, y - rise, z]));
+        }
         for d in [0.07, 0.2] {
             let name = if d > 0.1 { "baluster-long" } else { "baluster-short" };
             s.place(name, "white-paint", at(sx0 + 0.03, y, z - d));
@@ -178,14 +181,11 @@ pub fn scene() -> Scene {
         let name = ["red", "blue", "cushion"][k];
         s.put(&format!("book-{name}"), name, book.at(-0.92, 0.42 + 0.0305 * k as f64, 1.5));
     }
-    s.put("frame", "walnut", frame(1.1, 0.73).turned(-90.0).at(w, 1.75 + 0.9, 3.9));
-    s.put("painting", "landscape", canvas(1.1, 0.73).turned(-90.0).at(w, 1.75 + 0.9, 3.9));
-    s.define(
-        "sideboard",
-        block([-0.6, 0.12, -0.2], [0.6, 0.78, 0.2], 0.01).and(block([-0.63, 0.78, -0.22], [0.63, 0.81, 0.22], 0.008)),
-    );
-    s.place("sideboard", "walnut", turned(-90.0, w - 0.26, 0.0, 3.9));
-    s.put("vase", "ceramic", vase().at(w - 0.28, 0.81, 3.6));
+    s.put("frame", "walnut", frame(1.1, 0.73).turned(-90.0).at(w, 3.1, -0.35));
+    s.put("painting", "landscape", canvas(1.1, 0.73).turned(-90.0).at(w, 3.1, -0.35));
+    s.put("sideboard", "walnut", block([-0.6, 0.12, -0.2], [0.6, 0.78, 0.2], 0.01).at(2.2, 0.0, room + 0.22));
+    s.put("sideboard", "walnut", block([-0.63, 0.78, -0.22], [0.63, 0.81, 0.22], 0.008).at(2.2, 0.0, room + 0.22));
+    s.put("vase", "ceramic", vase().at(2.0, 0.81, room + 0.2));
 
     // Below the gallery: a dining table with chairs and a dresser.
     s.put("dining-table", "oak", table(1.5, 0.75, 0.8, true).at(-1.85, 0.0, -3.2));
@@ -251,7 +251,7 @@ pub fn scene() -> Scene {
         s.place_lamp("disc-down", c, at(x, y + 0.0635, z));
         s.place_lamp("disc-up", c, at(x, y + 0.0765, z));
     };
-    let warm = [210.0, 142.0, 74.0];
+    let warm = [1700.0, 1220.0, 720.0];
     shaded(&mut s, -1.85, 1.62, -3.2, warm);
     s.put("cords", "brass", rod([-1.85, 1.78, -3.2], [-1.85, slab0, -3.2], 0.005, 6));
     shaded(&mut s, -2.75, 1.45, -0.85, warm);
@@ -260,20 +260,14 @@ pub fn scene() -> Scene {
         "brass",
         rod([-2.75, 0.0, -0.85], [-2.75, 1.53, -0.85], 0.012, 10).and(cylinder(0.14, 0.02, 24).at(-2.75, 0.0, -0.85)),
     );
-    shaded(&mut s, w - 0.28, 1.25, 4.2, warm);
-    s.put(
-        "lamp-foot",
-        "brass",
-        rod([w - 0.28, 0.81, 4.2], [w - 0.28, 1.33, 4.2], 0.014, 10).and(cylinder(0.09, 0.03, 24).at(
-            w - 0.28,
-            0.81,
-            4.2,
-        )),
-    );
+    // On the wall over the stairs.
+    shaded(&mut s, w - 0.2, 2.75, 0.9, warm);
+    s.put("sconce", "brass", rod([w - 0.2, 2.8, 0.9], [w, 2.7, 0.9], 0.01, 8));
+    s.put("sconce", "brass", block([w - 0.02, 2.6, 0.85], [w, 2.8, 0.95], 0.006));
     // In the rooms behind the doors, and a pendant over the gallery.
-    shaded(&mut s, -0.6, 1.9, -5.4, [260.0, 200.0, 130.0]);
+    shaded(&mut s, -0.6, 1.9, -5.4, [2000.0, 1600.0, 1100.0]);
     s.put("cords", "brass", rod([-0.6, 2.06, -5.4], [-0.6, slab0, -5.4], 0.005, 6));
-    shaded(&mut s, -0.5, floor + 1.7, -5.3, [330.0, 215.0, 110.0]);
+    shaded(&mut s, -0.5, floor + 1.7, -5.3, [2400.0, 1650.0, 950.0]);
     s.put("cords", "brass", rod([-0.5, floor + 1.86, -5.3], [-0.5, h, -5.3], 0.005, 6));
     shaded(&mut s, 0.72, floor + 1.95, -3.35, warm);
     s.put("cords", "brass", rod([0.72, floor + 2.11, -3.35], [0.72, h, -3.35], 0.005, 6));

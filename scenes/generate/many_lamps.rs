@@ -110,7 +110,7 @@ fn build(s: &mut Scene, house: House, front: &str, turn: f64, x: f64, z: f64) {
 
 /// Round cobbles in shallow joints.
 fn cobbles() -> Picture {
-    Picture::new(256, 256, |u, v| {
+    Picture::new(192, 192, |u, v| {
         let (n, y) = (10.0, v * 12.0);
         let row = y.floor() as i64;
         let x = u * n + 0.5 * (row % 2) as f64 + 0.18 * hash(0, row, 9);
@@ -231,8 +231,8 @@ pub fn scene() -> Scene {
         let (ya, yb) = (4.3 + 0.9 * hash(k, 3, 2), 4.3 + 0.9 * hash(k, 4, 2));
         let sag = 0.75 + 0.4 * hash(k, 5, 2);
         let on = |t: f64| [-w + 2.0 * w * t, ya + (yb - ya) * t - 4.0 * sag * t * (1.0 - t), za + (zb - za) * t];
-        let path: Vec<[f64; 3]> = (0..=14).map(|i| on(i as f64 / 14.0)).map(|p| [p[0], p[1] + 0.03, p[2]]).collect();
-        s.put("cords", "cord", tube(&path, 4, |_| 0.006));
+        let path: Vec<[f64; 3]> = (0..=12).map(|i| on(i as f64 / 12.0)).map(|p| [p[0], p[1] + 0.03, p[2]]).collect();
+        s.put("cords", "cord", tube(&path, 3, |_| 0.006));
         bulbs.extend((0..per).map(|i| on((i as f64 + 0.5) / per as f64)));
     }
     let rest = BULBS - bulbs.len();
@@ -260,31 +260,24 @@ pub fn scene() -> Scene {
     for (i, p) in bulbs.iter().enumerate() {
         let r = hash(i as i64, 7, 13);
         let c = palette[if r < 0.72 { (r * 4.1) as usize } else { 3 + ((r - 0.72) * 10.7) as usize }.min(5)];
-        let strength = if i < lanterns.len() { 70.0 } else { 46.0 };
+        let strength = if i < lanterns.len() { 80.0 } else { 60.0 };
         s.place_lamp("bulb", c.map(|x| x * strength), at(p[0], p[1], p[2]));
     }
-    // An iron bollard row, and a cart's wheel leaning on the wall, close to the camera.
-    for k in 0..5 {
-        let p = [
-            [0.0, 0.0],
-            [0.09, 0.0],
-            [0.08, 0.05],
-            [0.06, 0.08],
-            [0.055, 0.7],
-            [0.08, 0.74],
-            [0.08, 0.78],
-            [0.05, 0.86],
-            [0.0, 0.88],
-        ];
-        for x in [-w + 0.85, w - 0.85] {
-            if k != 1 {
-                s.put(
-                    "bollards",
-                    "iron",
-                    lathe(&p, 16).at(x, 0.0, 3.6 - 0.02 * k as f64 + 1.9 * (k as f64 - 1.0).min(1.0)),
-                );
-            }
-        }
+    // Iron bollards along the kerbs, close to the camera.
+    let p = [
+        [0.0, 0.0],
+        [0.09, 0.0],
+        [0.08, 0.05],
+        [0.06, 0.08],
+        [0.055, 0.7],
+        [0.08, 0.74],
+        [0.08, 0.78],
+        [0.05, 0.86],
+        [0.0, 0.88],
+    ];
+    s.define("bollard", lathe(&p, 16));
+    for (x, z) in [(-1.0, 1.9), (1.0, 1.9), (-1.0, 3.7), (1.0, 3.7)] {
+        s.place("bollard", "iron", at(x * (w - 0.85), 0.0, z));
     }
     s
 }

@@ -62,7 +62,7 @@ pub struct Scene {
 
 /// `a, b, c`, shortest form.
 fn list(c: [f64; 3]) -> String {
-    c.map(|x| format!("{}", (x * 1e5).round() / 1e5 + 0.0)).join(", ")
+    c.map(|x| format!("{}", (x * 1e4).round() / 1e4 + 0.0)).join(", ")
 }
 
 fn rgb(name: &str, c: [f64; 3]) -> String {
@@ -263,17 +263,14 @@ impl Scene {
             x +=
                 &format!("    <shape type=\"ply\">\n        <string name=\"filename\" value=\"meshes/{file}.ply\"/>\n");
             if let Some(p) = s.place {
-                x += "        <transform name=\"to_world\">\n";
+                x += "        <transform name=\"to_world\">";
                 if p.turn != 0.0 {
-                    x += &format!("            <rotate y=\"1\" angle=\"{}\"/>\n", p.turn);
+                    x += &format!("<rotate y=\"1\" angle=\"{}\"/>", (p.turn * 1e4).round() / 1e4);
                 }
-                x += &format!("            <translate value=\"{}\"/>\n        </transform>\n", list(p.at));
+                x += &format!("<translate value=\"{}\"/></transform>\n", list(p.at));
             }
             match s.radiance {
-                Some(r) => {
-                    let r = rgb("radiance", r);
-                    x += &format!("        <emitter type=\"area\">\n            {r}\n        </emitter>\n");
-                }
+                Some(r) => x += &format!("        <emitter type=\"area\">{}</emitter>\n", rgb("radiance", r)),
                 None => x += &format!("        <ref id=\"{}\"/>\n", s.material),
             }
             x += "    </shape>\n";

@@ -153,7 +153,9 @@ pub fn curve<const N: usize>(points: &[[f64; N]], per: usize) -> Vec<[f64; N]> {
 /// of more than 40° stay sharp.
 pub fn lathe(profile: &[[f64; 2]], n: usize) -> Mesh {
     let mut m = Mesh::default();
-    let points: Vec<DVec2> = profile.iter().map(|&[r, y]| DVec2::new(r.max(0.0), y)).collect();
+    // Radii that are zero but for rounding, such as the sine of π, are zero.
+    let axis = |r: f64| if r < 1e-9 { 0.0 } else { r };
+    let points: Vec<DVec2> = profile.iter().map(|&[r, y]| DVec2::new(axis(r), y)).collect();
     let spans: Vec<(DVec2, DVec2)> =
         points.windows(2).map(|w| (w[0], w[1])).filter(|(a, b)| a.distance(*b) > 1e-9).collect();
     let normals: Vec<DVec2> = spans.iter().map(|(a, b)| DVec2::new(b.y - a.y, a.x - b.x).normalize()).collect();
@@ -188,10 +190,8 @@ pub fn cylinder(radius: f64, height: f64, n: usize) -> Mesh {
 
 /// A ball around the origin.
 pub fn ball(radius: f64, n: usize) -> Mesh {
-    let profile: Vec<[f64; 2]> = (0..=n)
-        .map(|i| PI * i as f64 / n as f64)
-        .map(|a| [if a < 3.14 { radius * a.sin() } else { 0.0 }, -radius * a.cos()])
-        .collect();
+    let profile: Vec<[f64; 2]> =
+        (0..=n).map(|i| PI * i as f64 / n as f64).map(|a| [radius * a.sin(), -radius * a.cos()]).collect();
     lathe(&profile, 2 * n)
 }
 

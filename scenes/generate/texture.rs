@@ -221,14 +221,14 @@ pub fn dim(a: [f64; 3], t: f64) -> [f64; 3] {
 
 /// Floorboards along v: `boards` across, each cut once at a height of its own.
 pub fn planks(dark: [f64; 3], light: [f64; 3], boards: usize, seed: u64) -> Picture {
-    Picture::new(256, 256, |u, v| {
+    Picture::new(192, 192, |u, v| {
         let x = u * boards as f64;
         let board = x.floor() as i64;
         let cut = hash(board, 1, seed);
         let y = (v - cut).rem_euclid(1.0);
         let half = (y > 0.5) as i64;
-        let edge = (x - x.floor()).min(1.0 - (x - x.floor())) * 256.0 / boards as f64;
-        let end = (y - 0.5).abs().min(y).min(1.0 - y) * 256.0;
+        let edge = (x - x.floor()).min(1.0 - (x - x.floor())) * 192.0 / boards as f64;
+        let end = (y - 0.5).abs().min(y).min(1.0 - y) * 192.0;
         let grain = fbm(u + hash(board, 7 + half, seed), v, 3 * boards as i64, 2, seed + 9);
         let c = mix(dark, light, 0.7 * grain + 0.75 * hash(board, 2 + half, seed) - 0.2);
         if edge < 1.0 || end < 1.0 { dim(c, 0.62) } else { c }
@@ -237,7 +237,7 @@ pub fn planks(dark: [f64; 3], light: [f64; 3], boards: usize, seed: u64) -> Pict
 
 /// Two by two tiles in two colours with joints and a little unevenness.
 pub fn tiles(a: [f64; 3], b: [f64; 3], joint: [f64; 3], seed: u64) -> Picture {
-    Picture::new(256, 256, |u, v| {
+    Picture::new(192, 192, |u, v| {
         let (x, y) = (u * 2.0, v * 2.0);
         let (i, j) = (x.floor() as i64, y.floor() as i64);
         let edge = [x, y].iter().map(|t| (t - t.round()).abs()).fold(1.0, f64::min);
@@ -252,7 +252,7 @@ pub fn tiles(a: [f64; 3], b: [f64; 3], joint: [f64; 3], seed: u64) -> Picture {
 
 /// Coursed ashlar: `rows` rows of blocks, every other row shifted.
 pub fn ashlar(base: [f64; 3], rows: i64, seed: u64) -> Picture {
-    Picture::new(256, 256, |u, v| {
+    Picture::new(192, 192, |u, v| {
         let y = v * rows as f64;
         let row = y.floor() as i64;
         let x = u * (rows / 2) as f64 + 0.5 * (row % 2) as f64;
