@@ -270,7 +270,7 @@ impl Bsdf {
                 };
                 self.smooth_sample(wo, wi, eta, mode)
             }
-            LobeSample::Delta(event) => self.delta_sample(wo, o, a, leaf, share, event, frame.to_world(event.b), mode),
+            LobeSample::Delta(event) => self.delta_sample(wo, leaf, share, (frame, a), event, mode),
         }
     }
 
@@ -291,18 +291,18 @@ impl Bsdf {
         last.map(|(leaf, share)| (leaf, share, crate::math::float::ONE_MINUS_EPSILON))
     }
 
-    #[allow(clippy::too_many_arguments)]
+    /// A discrete event of `leaf`, which is chosen with probability `share` and whose frame and view in it are `inner`.
     fn delta_sample(
         &self,
         wo: Vec3,
-        o: Vec3,
-        a: Vec3,
         leaf: &Leaf,
         share: f32,
+        inner: (Frame, Vec3),
         event: DeltaSample,
-        i: Vec3,
         mode: Transport,
     ) -> Option<BsdfSample> {
+        let (frame, a) = inner;
+        let (o, i) = (self.frame.to_local(wo), frame.to_world(event.b));
         let wi = if event.passes_through { -wo } else { self.frame.to_world(i).normalize() };
         let mut value = event.value * leaf.weight;
         if !event.passes_through {
