@@ -80,10 +80,9 @@ impl Material {
             }
             only_side = Some(usize::from(behind));
         }
-        let mut resolver = Resolver { point, only_side, bsdf };
-        resolver.root(node, ROOT);
-        resolver.bsdf.seal();
-        resolver.bsdf
+        Resolver { point, only_side, bsdf: &mut bsdf }.root(node, ROOT);
+        bsdf.seal();
+        bsdf
     }
 
     /// What the material can do.

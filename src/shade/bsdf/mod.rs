@@ -2,7 +2,7 @@
 //!
 //! A [`Material`] is a tree (two-sided, masks, blends, bump maps …) over scattering models; [`Material::resolve`] looks up its
 //! textures at a point and flattens it into a [`Bsdf`]: up to [`MAX_LEAVES`] weighted lobes, each in its own frame. The models are one
-//! file each and work in local coordinates ([`lobe`]).
+//! file each and work in local coordinates (`lobe.rs` says which).
 
 mod conductor;
 mod dielectric;
@@ -72,6 +72,10 @@ struct Leaf {
 /// The BSDF at one point: every texture looked up, seen from `wo`. A plain value without heap memory, cheap to make; it
 /// answers for the `wo` it was resolved with, and for any other direction on the same side or, in materials that let light through,
 /// on either side.
+///
+/// Under bump and normal maps the normal is turned towards the eye where it would face away (as Mitsuba does), so light that is
+/// traced from the other end may find it turned differently: there the adjoint can be positive where the density is zero. All
+/// densities are still functions of the two directions alone, so combinations of techniques stay consistent.
 #[derive(Clone, Debug)]
 pub struct Bsdf {
     ng: Vec3,

@@ -156,7 +156,7 @@ pub(super) struct Resolver<'a> {
     pub point: &'a SurfacePoint,
     /// Only this side is asked for; `None` for both, in materials that let light through.
     pub only_side: Option<usize>,
-    pub bsdf: Bsdf,
+    pub bsdf: &'a mut Bsdf,
 }
 
 impl Resolver<'_> {
