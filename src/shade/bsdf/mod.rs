@@ -93,6 +93,7 @@ fn side(z: f32) -> usize {
 }
 
 impl Bsdf {
+    #[inline]
     fn empty(point: &SurfacePoint) -> Bsdf {
         Bsdf { ng: point.ng, frame: point.frame, leaves: ArrayVec::new(), links: ArrayVec::new(), pick_scale: [0.0; 2] }
     }
