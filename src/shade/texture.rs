@@ -384,3 +384,6 @@ impl TextureSet {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,9 +1,9 @@
 //! One scattering model at one point, every texture looked up, in local coordinates (z = shading normal).
 //!
 //! Arguments: `a` is the direction the walk came from (the eye's side when radiance is carried), `b` the one it goes on in. Values
-//! are f · |cos θ_b| for [`Transport::Radiance`](crate::shade::Transport), so refraction is scaled by (1/η)². Every model here obeys
-//! f(a,b) = f(b,a) for reflection and η_b² f(b,a) = η_a² … in the sense of Veach 1997, eq. 5.14, so the adjoint is a factor that
-//! [`Bsdf`](super::Bsdf) applies.
+//! are f · |cos θ_b| for [`Transport::Radiance`](crate::shade::Transport), so refraction is scaled by (1/η)². Every model here is
+//! reciprocal in the sense of Veach 1997, eq. 5.14: f(a, b) η(b)² = f(b, a) η(a)² with η(·) the index of a direction's side. So the
+//! adjoint is a factor, which [`Bsdf`](super::Bsdf) applies.
 
 use super::conductor::{Conductor, RoughConductor};
 use super::dielectric::{Dielectric, ThinDielectric};

@@ -61,7 +61,14 @@ impl Material {
     /// Looks up every texture at `point` for a walk that arrived from `wo`.
     #[inline]
     pub fn resolve(&self, point: &SurfacePoint, wo: Vec3) -> Bsdf {
+        // One local, returned once and filled by reference: it is never copied.
         let mut bsdf = Bsdf::empty(point);
+        self.fill(&mut bsdf, point, wo);
+        bsdf
+    }
+
+    #[inline]
+    fn fill(&self, bsdf: &mut Bsdf, point: &SurfacePoint, wo: Vec3) {
         let mut node = &self.node;
         let mut only_side = None;
         if self.features.opaque() {
@@ -76,14 +83,11 @@ impl Material {
             }
             if let Node::Diffuse { reflectance } = node {
                 bsdf.set_lambert(reflectance.eval(point), behind);
-                return bsdf;
+                return;
             }
             only_side = Some(usize::from(behind));
         }
-        let mut resolver = Resolver { point, only_side, bsdf };
-        resolver.root(node, ROOT);
-        resolver.bsdf.seal();
-        resolver.bsdf
+        Resolver { point, only_side, bsdf }.root(node, ROOT);
     }
 
     /// What the material can do.

@@ -155,8 +155,8 @@ fn visible_beckmann_slope(cos: f32, u: f32) -> f32 {
         }
         let derivative = 2.0 * INV_SQRT_PI * (cos - x * sin) * (-x * x).exp();
         let next = x - error / derivative;
-        // The comparison is also false for a derivative of zero.
-        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+        // The comparison is also false for a step of 0/0. A step that changes nothing ends on the bracket.
+        let next = if next >= low && next <= high { next } else { 0.5 * (low + high) };
         if (next - x).abs() <= 1e-6 * (1.0 + x.abs()) {
             return next;
         }

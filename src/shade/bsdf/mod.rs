@@ -2,7 +2,7 @@
 //!
 //! A [`Material`] is a tree (two-sided, masks, blends, bump maps …) over scattering models; [`Material::resolve`] looks up its
 //! textures at a point and flattens it into a [`Bsdf`]: up to [`MAX_LEAVES`] weighted lobes, each in its own frame. The models are one
-//! file each and work in local coordinates ([`lobe`]).
+//! file each and work in local coordinates (`lobe.rs` says which).
 
 mod conductor;
 mod dielectric;
@@ -73,6 +73,10 @@ struct Leaf {
 /// The BSDF at one point: every texture looked up, seen from `wo`. A plain value without heap memory, cheap to make; it
 /// answers for the `wo` it was resolved with, and for any other direction on the same side or, in materials that let light through,
 /// on either side.
+///
+/// Under bump and normal maps the normal is turned towards the eye where it would face away (as Mitsuba does), so light that is
+/// traced from the other end may find it turned differently: there the adjoint can be positive where the density is zero. All
+/// densities are still functions of the two directions alone, so combinations of techniques stay consistent.
 #[derive(Clone, Debug)]
 pub struct Bsdf {
     ng: Vec3,
@@ -90,6 +94,7 @@ fn side(z: f32) -> usize {
 }
 
 impl Bsdf {
+    #[inline]
     fn empty(point: &SurfacePoint) -> Bsdf {
         Bsdf { ng: point.ng, frame: point.frame, leaves: ArrayVec::new(), links: ArrayVec::new(), pick_scale: [0.0; 2] }
     }
@@ -271,7 +276,7 @@ impl Bsdf {
                 };
                 self.smooth_sample(wo, wi, eta, mode)
             }
-            LobeSample::Delta(event) => self.delta_sample(wo, o, a, leaf, share, event, frame.to_world(event.b), mode),
+            LobeSample::Delta(event) => self.delta_sample(wo, leaf, share, (frame, a), event, mode),
         }
     }
 
@@ -292,18 +297,18 @@ impl Bsdf {
         last.map(|(leaf, share)| (leaf, share, crate::math::float::ONE_MINUS_EPSILON))
     }
 
-    #[allow(clippy::too_many_arguments)]
+    /// A discrete event of `leaf`, which is chosen with probability `share` and whose frame and view in it are `inner`.
     fn delta_sample(
         &self,
         wo: Vec3,
-        o: Vec3,
-        a: Vec3,
         leaf: &Leaf,
         share: f32,
+        inner: (Frame, Vec3),
         event: DeltaSample,
-        i: Vec3,
         mode: Transport,
     ) -> Option<BsdfSample> {
+        let (frame, a) = inner;
+        let (o, i) = (self.frame.to_local(wo), frame.to_world(event.b));
         let wi = if event.passes_through { -wo } else { self.frame.to_world(i).normalize() };
         let mut value = event.value * leaf.weight;
         if !event.passes_through {

@@ -156,17 +156,18 @@ pub(super) struct Resolver<'a> {
     pub point: &'a SurfacePoint,
     /// Only this side is asked for; `None` for both, in materials that let light through.
     pub only_side: Option<usize>,
-    pub bsdf: Bsdf,
+    pub bsdf: &'a mut Bsdf,
 }
 
 impl Resolver<'_> {
-    /// Adds the lobes of a whole material.
-    pub fn root(&mut self, node: &Node, link: u8) {
+    /// Adds the lobes of a whole material and normalises the choice between them.
+    pub fn root(mut self, node: &Node, link: u8) {
         let active = match self.only_side {
             None => [true; 2],
             Some(s) => [s == 0, s == 1],
         };
         self.visit(node, Place { weight: 1.0, link, active, mirrored: false, frame: self.point.frame });
+        self.bsdf.seal();
     }
 
     fn visit(&mut self, node: &Node, place: Place) {

@@ -210,6 +210,9 @@ impl Principled {
             return (b.z > 0.0).then_some(b);
         }
         let m = self.facets().sample(a * a.z.signum(), [u[1], u[2]]);
+        if a.dot(m) * a.z <= 0.0 {
+            return None;
+        }
         let interface = dielectric(a.dot(m), self.eta);
         if choose(rest, self.reflects_share(front, interface.reflectance)).0 {
             let b = reflect(a, m);

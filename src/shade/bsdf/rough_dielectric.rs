@@ -104,6 +104,10 @@ impl RoughDielectric {
             return None;
         }
         let m = self.sampled_facets(a).sample(a * a.z.signum(), [u[1], u[2]]);
+        if a.dot(m) * a.z <= 0.0 {
+            // Facets seen from behind: drawn where all normals are, not only the visible ones.
+            return None;
+        }
         let interface = dielectric(a.dot(m), self.eta);
         if choose(u[0], interface.reflectance).0 {
             let b = reflect(a, m);

@@ -1,0 +1,120 @@
+//! Materials from descriptions: what is refused, what is known before rendering, what sides show.
+
+use super::*;
+use crate::shade::Transport;
+
+/// Builds the last description of `bsdfs` and returns the messages.
+fn messages(bsdfs: Vec<BsdfKind>) -> (MaterialSet, Vec<String>) {
+    let descs: Vec<BsdfDesc> = bsdfs.into_iter().map(|kind| BsdfDesc { name: None, kind, span: None }).collect();
+    let mut diagnostics = Diagnostics::default();
+    let set = MaterialSet::build(&descs, &TextureSet::default(), &mut diagnostics);
+    (set, diagnostics.list.into_iter().map(|d| d.message).collect())
+}
+
+fn grey() -> BsdfKind {
+    BsdfKind::Diffuse { reflectance: rgb(0.2, 0.2, 0.2) }
+}
+
+#[test]
+fn impossible_trees_are_errors_and_render_as_the_default() {
+    let blend = |a, b| BsdfKind::Blend { weight: num(0.5), a: BsdfId(a), b: BsdfId(b) };
+    let glass = BsdfKind::Dielectric { eta: 1.5, specular_reflectance: white(), specular_transmittance: white() };
+    let cases: Vec<(Vec<BsdfKind>, &str)> = vec![
+        (vec![blend(0, 0)], "nested in itself"),
+        (vec![blend(7, 7)], "does not exist"),
+        (vec![grey(), blend(0, 0), blend(1, 1), blend(2, 2), blend(3, 3)], "16 lobes"),
+        (vec![glass, BsdfKind::TwoSided { front: BsdfId(0), back: BsdfId(0) }], "two-sided"),
+        (vec![grey(), BsdfKind::BumpMap { nested: BsdfId(0), height: TextureId(3), scale: 1.0 }], "height map"),
+        (vec![grey(), BsdfKind::NormalMap { nested: BsdfId(0), normals: TextureId(3) }], "normal map"),
+        (
+            vec![BsdfKind::Plastic {
+                eta: -1.0,
+                diffuse_reflectance: white(),
+                specular_reflectance: white(),
+                nonlinear: false,
+            }],
+            "not positive",
+        ),
+    ];
+    for (kinds, expected) in cases {
+        let last = BsdfId(kinds.len() as u32 - 1);
+        let (set, messages) = messages(kinds);
+        assert!(messages.iter().any(|m| m.contains(expected)), "{expected}: {messages:?}");
+        let bsdf = set.get(Some(last)).resolve(&flat(), Vec3::Z);
+        assert_eq!(bsdf.albedo(), Rgb::grey(0.5));
+    }
+    // Children shared so often that the tree would have 2^30 nodes.
+    let doubling: Vec<BsdfKind> = std::iter::once(grey()).chain((0..30).map(|i| blend(i, i))).collect();
+    assert!(!messages(doubling).1.is_empty());
+}
+
+#[test]
+fn eight_lobes_are_all_there() {
+    let blend = |a, b| BsdfKind::Blend { weight: num(0.5), a: BsdfId(a), b: BsdfId(b) };
+    let (set, messages) = messages(vec![grey(), blend(0, 0), blend(1, 1), blend(2, 2)]);
+    assert!(messages.is_empty(), "{messages:?}");
+    let bsdf = set.get(Some(BsdfId(3))).resolve(&flat(), Vec3::Z);
+    let (value, pdf) = bsdf.eval_and_pdf(Vec3::Z, Vec3::Z, Transport::Radiance);
+    assert!(
+        (value.g - 0.2 * std::f32::consts::FRAC_1_PI).abs() < 1e-6
+            && (pdf.0 - std::f32::consts::FRAC_1_PI).abs() < 1e-6
+    );
+}
+
+#[test]
+fn features_say_what_a_material_can_do() {
+    let of = |name: &str| ZOO.get(name).features();
+    assert!(of("diffuse").smooth && of("diffuse").opaque() && !of("diffuse").delta && !of("diffuse").two_sided);
+    assert!(of("dielectric").delta && of("dielectric").transmissive && !of("dielectric").smooth);
+    assert!(of("plastic").delta && of("plastic").smooth && of("plastic").opaque());
+    assert!(of("mask").passes_through && !of("mask").opaque() && of("mask").two_sided);
+    assert!(of("bump_diffuse").textured && of("bump_diffuse").tilted);
+    assert!(of("principled_glass").transmissive && !of("principled_opaque").transmissive);
+    let (set, _) = messages(vec![BsdfKind::Diffuse { reflectance: rgb(0.0, 0.0, 0.0) }]);
+    assert!(set.get(Some(BsdfId(0))).is_black() && !set.get(None).is_black());
+    assert!(!ZOO.get("mask").is_black());
+}
+
+#[test]
+fn backs_are_black_unless_two_sided() {
+    let (wo, wi) = (Vec3::new(0.3, 0.1, -0.8).normalize(), Vec3::new(-0.2, 0.4, -0.7).normalize());
+    for name in ["diffuse", "rough_conductor_ggx", "plastic", "rough_plastic_ggx", "principled_plain", "phong", "ward"]
+    {
+        let bsdf = ZOO.get(name).resolve(&flat(), wo);
+        assert!(
+            bsdf.eval(wo, wi, Transport::Radiance).is_black()
+                && bsdf.sample(wo, [0.5; 3], Transport::Radiance).is_none()
+        );
+        assert!(!bsdf.connectable(), "{name}");
+    }
+    // The front is diffuse, the back a mirror.
+    let back = ZOO.get("two_sided").resolve(&flat(), wo);
+    let s = back.sample(wo, [0.5; 3], Transport::Radiance).expect("a mirror reflects");
+    assert!(s.delta && (s.wi - Vec3::new(-wo.x, -wo.y, wo.z)).length() < 1e-6 && !back.connectable());
+    assert!(ZOO.get("two_sided").resolve(&flat(), -wo).connectable());
+}
+
+#[test]
+fn masks_and_null_let_light_straight_through() {
+    let wo = Vec3::new(0.3, 0.1, 0.8).normalize();
+    let mut rng = HashRng::new(1, 0, 0, 0);
+    for (name, share) in [("null", 1.0f32), ("mask", 0.6)] {
+        for mode in [Transport::Radiance, Transport::Importance] {
+            let bsdf = ZOO.get(name).resolve(&leaning(), wo);
+            let through = (0..4000).filter_map(|_| bsdf.sample(wo, next3(&mut rng), mode)).filter(|s| s.passes_through);
+            let sum: f32 = through
+                .map(|s| {
+                    assert!(s.wi == -wo && s.eta == 1.0 && s.delta);
+                    s.value.g / s.pdf.0
+                })
+                .sum();
+            // Standard error below 0.02.
+            assert!((sum / 4000.0 - share).abs() < 0.08, "{name} {sum}");
+        }
+    }
+}
+
+#[test]
+fn a_bsdf_is_a_small_value() {
+    assert!(std::mem::size_of::<crate::shade::Bsdf>() <= 1024, "{}", std::mem::size_of::<crate::shade::Bsdf>());
+}
