@@ -108,7 +108,11 @@ impl Assets {
             scene.meshes.push(match mesh {
                 Ok(loaded) => {
                     if loaded.skipped_faces > 0 {
-                        let message = format!("`{}`: {} faces of fewer than three corners are left out", path.display(), loaded.skipped_faces);
+                        let message = format!(
+                            "`{}`: {} faces of fewer than three corners are left out",
+                            path.display(),
+                            loaded.skipped_faces
+                        );
                         report.push(Diagnostic::warning("load::mesh", message).at(span));
                     }
                     loaded.mesh
@@ -116,7 +120,11 @@ impl Assets {
                 Err(e) => {
                     let io = matches!(e, MeshError::Io(_));
                     let d = missing_mesh(&path, &e).at(span);
-                    if io { report.push_io(d) } else { report.push(d) }
+                    if io {
+                        report.push_io(d)
+                    } else {
+                        report.push(d)
+                    }
                     MeshDesc::default()
                 }
             });
@@ -140,7 +148,9 @@ impl Assets {
                 if self.strict {
                     report.push_io(Diagnostic::error("load::image", message).at(span));
                 } else {
-                    report.push(Diagnostic::warning("load::image", message).at(span).help("magenta is shown in its place"));
+                    report.push(
+                        Diagnostic::warning("load::image", message).at(span).help("magenta is shown in its place"),
+                    );
                 }
                 magenta()
             });

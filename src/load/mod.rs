@@ -101,7 +101,10 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<(SceneDesc, Diag
     if let Some(scene) = &mut scene {
         scene.path = path.to_path_buf();
         if ending != "xml" && !options.definitions.is_empty() {
-            report.push(Diagnostic::warning("load::unused-definition", "definitions (-D) have no use in this file format"));
+            report.push(Diagnostic::warning(
+                "load::unused-definition",
+                "definitions (-D) have no use in this file format",
+            ));
         }
         // A scene with holes in it would only raise errors that follow from the first ones.
         if !report.has_errors() {
@@ -116,6 +119,3 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<(SceneDesc, Diag
         _ => Err(LoadFailure { diagnostics, io }),
     }
 }
-
-#[cfg(test)]
-mod tests;

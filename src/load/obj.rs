@@ -86,7 +86,10 @@ pub(super) fn parse(reader: impl BufRead) -> Result<ObjFile, MeshError> {
 }
 
 /// Hands out lines with their numbers, comments cut off, lines that end in `\` joined with the next.
-pub(super) fn for_each_line(mut reader: impl BufRead, mut each: impl FnMut(u64, &str) -> Result<(), MeshError>) -> Result<(), MeshError> {
+pub(super) fn for_each_line(
+    mut reader: impl BufRead,
+    mut each: impl FnMut(u64, &str) -> Result<(), MeshError>,
+) -> Result<(), MeshError> {
     let (mut raw, mut joined, mut number) = (Vec::new(), String::new(), 0u64);
     loop {
         raw.clear();
@@ -145,9 +148,13 @@ fn statement(file: &mut ObjFile, corners: &mut Vec<Corner>, number: u64, line: &
         "usemtl" => file.materials.push((file.triangles.len(), rest.trim().to_owned(), number)),
         "mtllib" => file.libraries.push((rest.trim().to_owned(), number)),
         // Groups, names, smoothing, lines and points, free-form surfaces' parameters: nothing to see or nothing to keep.
-        "" | "g" | "o" | "s" | "l" | "p" | "vp" | "mg" | "lod" | "shadow_obj" | "trace_obj" | "bevel" | "c_interp" | "d_interp" | "usemap" | "maplib" => {}
-        "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim" | "hole" | "scrv" | "sp" | "end" | "con" => {}
-        other => return Err(format!("unknown statement `{}`: not an OBJ file?", other.chars().take(40).collect::<String>())),
+        "" | "g" | "o" | "s" | "l" | "p" | "vp" | "mg" | "lod" | "shadow_obj" | "trace_obj" | "bevel" | "c_interp"
+        | "d_interp" | "usemap" | "maplib" => {}
+        "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim" | "hole" | "scrv" | "sp"
+        | "end" | "con" => {}
+        other => {
+            return Err(format!("unknown statement `{}`: not an OBJ file?", other.chars().take(40).collect::<String>()));
+        }
     }
     Ok(())
 }
@@ -174,7 +181,9 @@ fn corner(file: &ObjFile, word: &str) -> Result<Corner, String> {
         if part.is_empty() && i > 0 {
             continue;
         }
-        let given: i64 = part.parse().map_err(|_| format!("`{word}` is not a corner of a face: expected v, v/vt, v//vn or v/vt/vn"))?;
+        let given: i64 = part
+            .parse()
+            .map_err(|_| format!("`{word}` is not a corner of a face: expected v, v/vt, v//vn or v/vt/vn"))?;
         let index = if given < 0 { counts[i] as i64 + given } else { given - 1 };
         if index < 0 || index >= counts[i] as i64 || index >= i64::from(NONE) {
             return Err(format!("there is no {} {given}: {} are defined so far", names[i], counts[i]));

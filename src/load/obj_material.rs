@@ -81,10 +81,13 @@ fn property(mtl: &mut Mtl, keyword: &str, rest: &str) -> Result<(), String> {
         "map_Ks" => mtl.map_specular = Some(map(rest)?),
         "map_Ke" => mtl.map_emission = Some(map(rest)?),
         "map_d" => mtl.map_dissolve = Some(map(rest)?),
-        "map_Bump" | "map_bump" | "bump" | "norm" => return Err("bump and normal maps of OBJ materials are not supported: ignored".into()),
+        "map_Bump" | "map_bump" | "bump" | "norm" => {
+            return Err("bump and normal maps of OBJ materials are not supported: ignored".into());
+        }
         // Ambient terms, and what newer exporters add without a common meaning.
-        "Ka" | "Km" | "map_Ka" | "map_Ns" | "map_Tr" | "disp" | "decal" | "refl" | "sharpness" | "map_aat" | "Pr" | "Pm" | "Ps" | "Pc" | "Pcr"
-        | "aniso" | "anisor" | "map_Pr" | "map_Pm" | "map_Ps" | "map_Ke_factor" | "map_refl" | "Kt" | "map_Disp" | "map_Kn" => {}
+        "Ka" | "Km" | "map_Ka" | "map_Ns" | "map_Tr" | "disp" | "decal" | "refl" | "sharpness" | "map_aat" | "Pr"
+        | "Pm" | "Ps" | "Pc" | "Pcr" | "aniso" | "anisor" | "map_Pr" | "map_Pm" | "map_Ps" | "map_Ke_factor"
+        | "map_refl" | "Kt" | "map_Disp" | "map_Kn" => {}
         other => return Err(format!("unknown property `{other}`")),
     }
     Ok(())
@@ -113,7 +116,8 @@ fn map(text: &str) -> Result<Map, String> {
     let mut out = Map { file: String::new(), scale: [1.0; 2], offset: [0.0; 2], clamp: false };
     let mut rest = text.trim();
     while rest.starts_with('-') {
-        let (option, after) = rest.split_once(|c: char| c.is_ascii_whitespace()).ok_or("a texture without a file name")?;
+        let (option, after) =
+            rest.split_once(|c: char| c.is_ascii_whitespace()).ok_or("a texture without a file name")?;
         rest = after.trim_start();
         // Up to so many numbers (or words) belong to the option.
         let (most, numeric) = match option {
@@ -134,7 +138,8 @@ fn map(text: &str) -> Result<Map, String> {
             }
             rest = after.trim_start();
         }
-        let pair = |default: f32| [values.first().copied().unwrap_or(default), values.get(1).copied().unwrap_or(default)];
+        let pair =
+            |default: f32| [values.first().copied().unwrap_or(default), values.get(1).copied().unwrap_or(default)];
         match option {
             "-s" => out.scale = pair(1.0),
             "-o" => out.offset = pair(0.0),
@@ -168,7 +173,8 @@ mod tests {
 
     #[test]
     fn complains_with_the_line_and_goes_on() {
-        let (all, complaints) = parse("Kd 1 1 1\nnewmtl a\nKd 1 x 1\nbogus 1\nmap_Kd -s 1\nKs 0.5 0.5 0.5\n".as_bytes()).unwrap();
+        let (all, complaints) =
+            parse("Kd 1 1 1\nnewmtl a\nKd 1 x 1\nbogus 1\nmap_Kd -s\nKs 0.5 0.5 0.5\n".as_bytes()).unwrap();
         assert_eq!(complaints.iter().map(|c| c.line).collect::<Vec<_>>(), [1, 3, 4, 5]);
         assert_eq!(all[0].specular, Some(Rgb::grey(0.5)));
     }

@@ -10,8 +10,8 @@ use super::{LoadOptions, framing, ply};
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, Source, nearest};
 use crate::scene::{
-    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, EmitterDesc, EmitterKind, MeshId, ScalarDesc, SceneDesc, ShapeDesc, Span, TextureDesc,
-    TextureFilter, TextureId, WrapMode,
+    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, EmitterDesc, EmitterKind, MeshId, ScalarDesc, SceneDesc,
+    ShapeDesc, Span, TextureDesc, TextureFilter, TextureId, WrapMode,
 };
 use glam::DMat4;
 use std::collections::HashMap;
@@ -28,7 +28,8 @@ const MIRROR_EXPONENT: f32 = 1e4;
 
 /// Reads a PLY file as a scene of one grey object.
 pub(super) fn load_ply(path: &Path, options: &LoadOptions, report: &mut Report) -> Option<SceneDesc> {
-    let LoadedMesh { mesh, skipped_faces } = ply::read_ply(path, MeshOptions::default()).map_err(|e| unreadable(path, &e, report)).ok()?;
+    let LoadedMesh { mesh, skipped_faces } =
+        ply::read_ply(path, MeshOptions::default()).map_err(|e| unreadable(path, &e, report)).ok()?;
     if skipped_faces > 0 {
         let message = format!("`{}`: {skipped_faces} faces of fewer than three corners are left out", path.display());
         report.push(Diagnostic::warning("load::mesh", message));
@@ -52,7 +53,8 @@ pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) 
 
     let mut model = Model { assets: Assets::new(options.strict), ..Model::default() };
     if file.skipped_faces > 0 {
-        let message = format!("`{}`: {} faces of fewer than three corners are left out", path.display(), file.skipped_faces);
+        let message =
+            format!("`{}`: {} faces of fewer than three corners are left out", path.display(), file.skipped_faces);
         report.push(Diagnostic::warning("load::mesh", message));
     }
     for (name, line, ranges) in by_material(&file) {
@@ -62,7 +64,10 @@ pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) 
         mesh.name = format!("{} ({name})", path.display());
         let found = materials.get(&name);
         if found.is_none() && !name.is_empty() {
-            let mut d = Diagnostic::warning("load::unknown-material", format!("`{}`, line {line}: there is no material `{name}`", path.display()));
+            let mut d = Diagnostic::warning(
+                "load::unknown-material",
+                format!("`{}`, line {line}: there is no material `{name}`", path.display()),
+            );
             d = match nearest(&name, materials.keys().map(String::as_str)) {
                 Some(near) => d.help(format!("did you mean `{near}`? A grey one is used")),
                 None => d.help("a grey one is used"),
@@ -88,11 +93,18 @@ fn unreadable(path: &Path, e: &MeshError, report: &mut Report) {
 }
 
 /// Reads an MTL file; one that is missing costs the colours only.
-fn read_library(path: &Path, obj: &Path, line: u64, into: &mut HashMap<String, (Mtl, Arc<Source>)>, report: &mut Report) {
+fn read_library(
+    path: &Path,
+    obj: &Path,
+    line: u64,
+    into: &mut HashMap<String, (Mtl, Arc<Source>)>,
+    report: &mut Report,
+) {
     let text = match std::fs::read(path) {
         Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
         Err(e) => {
-            let message = format!("`{}`, line {line}: cannot read the materials `{}`: {e}", obj.display(), path.display());
+            let message =
+                format!("`{}`, line {line}: cannot read the materials `{}`: {e}", obj.display(), path.display());
             report.push(Diagnostic::warning("load::missing-mtl", message).help("everything that uses them is grey"));
             return;
         }
@@ -152,7 +164,15 @@ impl Model {
     }
 
     fn shape(&mut self, mesh: MeshId, bsdf: BsdfId, emission: Option<AreaEmission>, span: Option<Span>) {
-        let shape = ShapeDesc { mesh, to_world: DMat4::IDENTITY, bsdf: Some(bsdf), emission, flip_normals: false, name: None, span };
+        let shape = ShapeDesc {
+            mesh,
+            to_world: DMat4::IDENTITY,
+            bsdf: Some(bsdf),
+            emission,
+            flip_normals: false,
+            name: None,
+            span,
+        };
         self.scene.shapes.push(shape);
     }
 
@@ -160,7 +180,10 @@ impl Model {
     fn finish(mut self, options: &LoadOptions, report: &mut Report) -> SceneDesc {
         self.assets.decode_images(&mut self.scene, report);
         if self.scene.shapes.iter().all(|s| s.emission.is_none()) && !self.scene.shapes.is_empty() {
-            report.push(Diagnostic::note("load::added-sky", "nothing in this file shines: a sky of constant radiance 1 is added"));
+            report.push(Diagnostic::note(
+                "load::added-sky",
+                "nothing in this file shines: a sky of constant radiance 1 is added",
+            ));
             self.scene.emitters.push(EmitterDesc { kind: EmitterKind::Constant { radiance: Rgb::WHITE }, span: None });
         }
         match framing::camera(&self.scene, &options.camera) {
@@ -180,7 +203,8 @@ impl Model {
         let specular = mtl.specular.unwrap_or(Rgb::BLACK);
         let dissolve = mtl.dissolve.unwrap_or(1.0);
         let refracts = mtl.ior.is_some_and(|i| i > 1.0);
-        if matches!(mtl.illumination, Some(4 | 6 | 7 | 9)) || (dissolve < 1.0 && refracts && mtl.map_dissolve.is_none()) {
+        if matches!(mtl.illumination, Some(4 | 6 | 7 | 9)) || (dissolve < 1.0 && refracts && mtl.map_dissolve.is_none())
+        {
             // Black stands for "not filled in" in what many exporters write.
             let tint = mtl.transmission.filter(|t| !t.is_black()).unwrap_or(Rgb::WHITE);
             let kind = BsdfKind::Dielectric {
@@ -192,10 +216,16 @@ impl Model {
         }
         let diffuse = self.color(mtl.map_diffuse.as_ref(), mtl.diffuse.unwrap_or(Rgb::grey(0.5)), folder, span.clone());
         let shininess = mtl.shininess.unwrap_or(0.0);
-        let mirror = matches!(mtl.illumination, Some(3 | 5 | 8)) || (shininess >= MIRROR_EXPONENT && !specular.is_black());
+        let mirror =
+            matches!(mtl.illumination, Some(3 | 5 | 8)) || (shininess >= MIRROR_EXPONENT && !specular.is_black());
         let kind = if mirror {
-            let tint = if specular.is_black() { diffuse } else { ColorDesc::Constant(specular.map(|v| v.clamp(0.0, 1.0))) };
-            BsdfKind::Conductor { eta: ColorDesc::Constant(Rgb::BLACK), k: ColorDesc::Constant(Rgb::WHITE), specular_reflectance: tint }
+            let tint =
+                if specular.is_black() { diffuse } else { ColorDesc::Constant(specular.map(|v| v.clamp(0.0, 1.0))) };
+            BsdfKind::Conductor {
+                eta: ColorDesc::Constant(Rgb::BLACK),
+                k: ColorDesc::Constant(Rgb::WHITE),
+                specular_reflectance: tint,
+            }
         } else if shininess > 1.0 && (!specular.is_black() || mtl.map_specular.is_some()) {
             self.glossy(mtl, diffuse, specular, shininess, folder, span.clone())
         } else {
@@ -214,7 +244,15 @@ impl Model {
     }
 
     /// Diffuse and specular part together reflect no more than what arrives.
-    fn glossy(&mut self, mtl: &Mtl, diffuse: ColorDesc, specular: Rgb, exponent: f32, folder: &Path, span: Option<Span>) -> BsdfKind {
+    fn glossy(
+        &mut self,
+        mtl: &Mtl,
+        diffuse: ColorDesc,
+        specular: Rgb,
+        exponent: f32,
+        folder: &Path,
+        span: Option<Span>,
+    ) -> BsdfKind {
         let specular = self.color(mtl.map_specular.as_ref(), specular, folder, span);
         let brightest = |c: ColorDesc| match c {
             ColorDesc::Constant(c) => c.max_component(),
@@ -226,7 +264,11 @@ impl Model {
             ColorDesc::Constant(c) => ColorDesc::Constant(c * scale),
             texture => texture,
         };
-        BsdfKind::Phong { exponent: ScalarDesc::Constant(exponent), specular_reflectance: scaled(specular), diffuse_reflectance: scaled(diffuse) }
+        BsdfKind::Phong {
+            exponent: ScalarDesc::Constant(exponent),
+            specular_reflectance: scaled(specular),
+            diffuse_reflectance: scaled(diffuse),
+        }
     }
 
     fn color(&mut self, map: Option<&Map>, constant: Rgb, folder: &Path, span: Option<Span>) -> ColorDesc {
@@ -242,7 +284,13 @@ impl Model {
         // The file's v runs up, ours down: 1 − (s (1 − v) + o) = s v + (1 − s − o).
         let to_uv = [[su, 0.0, ou], [0.0, sv, 1.0 - sv - ov]];
         let wrap = if map.clamp { WrapMode::Clamp } else { WrapMode::Repeat };
-        self.scene.textures.push(TextureDesc::Bitmap { image, to_uv, filter: TextureFilter::Bilinear, wrap, scale: 1.0 });
+        self.scene.textures.push(TextureDesc::Bitmap {
+            image,
+            to_uv,
+            filter: TextureFilter::Bilinear,
+            wrap,
+            scale: 1.0,
+        });
         TextureId((self.scene.textures.len() - 1) as u32)
     }
 }

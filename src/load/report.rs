@@ -48,7 +48,8 @@ impl Report {
     /// The messages, and whether the file system was at fault.
     pub(super) fn finish(mut self) -> (Diagnostics, bool) {
         if self.full() {
-            self.diagnostics.push(Diagnostic::note("load::too-many-errors", format!("stopped after {MAX_ERRORS} errors")));
+            self.diagnostics
+                .push(Diagnostic::note("load::too-many-errors", format!("stopped after {MAX_ERRORS} errors")));
         }
         (self.diagnostics, self.io)
     }

@@ -29,7 +29,11 @@ pub(super) fn read_serialized(path: &Path, index: u32, options: MeshOptions) -> 
     let (offset, end, version) = find(&mut file, size, index)?;
     file.seek(SeekFrom::Start(offset + 4))?;
     let compressed = end.saturating_sub(offset + 4);
-    let mut inflated = Inflated { reader: ZlibDecoder::new(BufReader::new(file.take(compressed))), limit: compressed.saturating_mul(MAX_COMPRESSION), offset };
+    let mut inflated = Inflated {
+        reader: ZlibDecoder::new(BufReader::new(file.take(compressed))),
+        limit: compressed.saturating_mul(MAX_COMPRESSION),
+        offset,
+    };
     let (mut mesh, face_normals) = inflated.mesh(version)?;
     mesh::finish(&mut mesh, MeshOptions { face_normals: options.face_normals || face_normals, ..options });
     mesh.name = format!("{} #{index}", path.display());
@@ -51,7 +55,10 @@ fn find(file: &mut File, size: u64, index: u32) -> Result<(u64, u64, u16), MeshE
         return Err(bad(size - 4, format!("the table of {count} meshes does not fit into the file")));
     };
     if u64::from(index) >= count {
-        return Err(MeshError::new(Place::File, format!("there is no mesh {index}: the file holds {count} (counted from 0)")));
+        return Err(MeshError::new(
+            Place::File,
+            format!("there is no mesh {index}: the file holds {count} (counted from 0)"),
+        ));
     }
     let mut offset = |i: u64| -> Result<u64, MeshError> {
         if i == count {
@@ -62,7 +69,10 @@ fn find(file: &mut File, size: u64, index: u32) -> Result<(u64, u64, u16), MeshE
     };
     let (begin, end) = (offset(u64::from(index))?, offset(u64::from(index) + 1)?);
     if begin.saturating_add(4) > end || end > table {
-        return Err(bad(table + u64::from(index) * width, format!("mesh {index} is said to lie at bytes {begin} to {end}")));
+        return Err(bad(
+            table + u64::from(index) * width,
+            format!("mesh {index} is said to lie at bytes {begin} to {end}"),
+        ));
     }
     Ok((begin, end, header(file, begin)?))
 }
@@ -76,7 +86,10 @@ fn header(file: &mut File, offset: u64) -> Result<u16, MeshError> {
         return Err(MeshError::new(Place::Byte(offset), "not a serialized mesh: its first bytes must be 1C 04"));
     }
     if !(3..=4).contains(&version) {
-        return Err(MeshError::new(Place::Byte(offset + 2), format!("version {version} is not known: expected 3 or 4")));
+        return Err(MeshError::new(
+            Place::Byte(offset + 2),
+            format!("version {version} is not known: expected 3 or 4"),
+        ));
     }
     Ok(version)
 }
@@ -118,11 +131,14 @@ impl<R: Read> Inflated<R> {
         let vertices = u64::from_le_bytes(self.bytes()?);
         let triangles = u64::from_le_bytes(self.bytes()?);
         let float = if flags & DOUBLE != 0 { 8 } else { 4 };
-        let per_vertex = [(true, 3), (flags & HAS_NORMALS != 0, 3), (flags & HAS_UVS != 0, 2), (flags & HAS_COLORS != 0, 3)];
+        let per_vertex =
+            [(true, 3), (flags & HAS_NORMALS != 0, 3), (flags & HAS_UVS != 0, 2), (flags & HAS_COLORS != 0, 3)];
         let floats: u64 = per_vertex.iter().filter(|p| p.0).map(|p| p.1).sum();
         let needed = vertices.saturating_mul(floats * float).saturating_add(triangles.saturating_mul(12));
         if needed > self.limit || vertices > u64::from(u32::MAX) {
-            return Err(self.bad(format!("truncated: {vertices} vertices and {triangles} triangles do not fit into the file")));
+            return Err(
+                self.bad(format!("truncated: {vertices} vertices and {triangles} triangles do not fit into the file"))
+            );
         }
         let (n, double) = (vertices as usize, flags & DOUBLE != 0);
         let mut mesh = MeshDesc { positions: self.rows(n, double, Vec3::from_array)?, ..MeshDesc::default() };
@@ -146,14 +162,22 @@ impl<R: Read> Inflated<R> {
             let raw: [u8; 12] = self.bytes()?;
             let t: [u32; 3] = std::array::from_fn(|k| u32::from_le_bytes(std::array::from_fn(|b| raw[4 * k + b])));
             if t.iter().any(|&v| v as usize >= n) {
-                return Err(self.bad(format!("triangle {i} names vertex {}, but there are {n} vertices", t.iter().max().unwrap_or(&0))));
+                return Err(self.bad(format!(
+                    "triangle {i} names vertex {}, but there are {n} vertices",
+                    t.iter().max().unwrap_or(&0)
+                )));
             }
             mesh.triangles.push(t);
         }
         Ok((mesh, flags & FACE_NORMALS != 0))
     }
 
-    fn rows<T, const N: usize>(&mut self, count: usize, double: bool, make: impl Fn([f32; N]) -> T) -> Result<Vec<T>, MeshError> {
+    fn rows<T, const N: usize>(
+        &mut self,
+        count: usize,
+        double: bool,
+        make: impl Fn([f32; N]) -> T,
+    ) -> Result<Vec<T>, MeshError> {
         let mut out = Vec::with_capacity(count);
         for _ in 0..count {
             let mut row = [0.0f32; N];
@@ -187,7 +211,12 @@ mod tests {
             z.write_all(&3u64.to_le_bytes()).unwrap();
             z.write_all(&1u64.to_le_bytes()).unwrap();
             let mut put = |v: f64| {
-                if flags & DOUBLE != 0 { z.write_all(&v.to_le_bytes()) } else { z.write_all(&(v as f32).to_le_bytes()) }.unwrap();
+                if flags & DOUBLE != 0 {
+                    z.write_all(&v.to_le_bytes())
+                } else {
+                    z.write_all(&(v as f32).to_le_bytes())
+                }
+                .unwrap();
             };
             [shift, 0., 0., 1., 0., 0., 0., 1., 0.].into_iter().for_each(&mut put);
             if flags & HAS_UVS != 0 {

@@ -3,6 +3,7 @@
 use super::desc::{EmitterKind, MeshDesc, SceneDesc, ShapeDesc};
 use super::diag::{Diagnostic, Diagnostics, Span};
 use glam::DMat4;
+use rayon::prelude::*;
 
 /// Checks `scene` and adds what is wrong to `out`: no sensor, no shapes, an empty film, a crop outside the film, vertices that are not
 /// finite, indices out of range and transforms that cannot be inverted are errors; a scene without light and triangles without
@@ -10,13 +11,17 @@ use glam::DMat4;
 pub fn validate(scene: &SceneDesc, out: &mut Diagnostics) {
     sensors(scene, out);
     let all: Vec<&ShapeDesc> = scene.shapes.iter().chain(scene.groups.iter().flat_map(|g| &g.shapes)).collect();
-    let placed = scene.instances.iter().any(|i| scene.groups.get(i.group.index()).is_some_and(|g| !g.shapes.is_empty()));
+    let placed =
+        scene.instances.iter().any(|i| scene.groups.get(i.group.index()).is_some_and(|g| !g.shapes.is_empty()));
     if scene.shapes.is_empty() && !placed {
         out.push(Diagnostic::error("scene::empty", "the scene has no shapes: there is nothing to see"));
     }
     let shines = !scene.emitters.is_empty() || scene.shapes.iter().any(|s| s.emission.is_some());
     if !shines {
-        out.push(Diagnostic::warning("scene::no-emitter", "nothing in the scene emits light: the picture will be black"));
+        out.push(Diagnostic::warning(
+            "scene::no-emitter",
+            "nothing in the scene emits light: the picture will be black",
+        ));
     }
     for shape in &all {
         transform(&shape.to_world, "shape", shape.span.as_ref(), out);
@@ -25,7 +30,10 @@ pub fn validate(scene: &SceneDesc, out: &mut Diagnostics) {
         transform(&instance.to_world, "instance", instance.span.as_ref(), out);
     }
     for emitter in &scene.emitters {
-        if let EmitterKind::Spot { to_world, .. } | EmitterKind::Envmap { to_world, .. } | EmitterKind::SunSky { to_world, .. } = &emitter.kind {
+        if let EmitterKind::Spot { to_world, .. }
+        | EmitterKind::Envmap { to_world, .. }
+        | EmitterKind::SunSky { to_world, .. } = &emitter.kind
+        {
             transform(to_world, "emitter", emitter.span.as_ref(), out);
         }
     }
@@ -45,9 +53,14 @@ fn sensors(scene: &SceneDesc, out: &mut Diagnostics) {
             let message = format!("a film of {} x {} pixels has no room for a picture", film.width, film.height);
             out.push(Diagnostic::error("scene::empty-film", message).at(span));
         } else if let Some([x, y, width, height]) = film.crop {
-            let inside = |offset: u32, size: u32, whole: u32| size > 0 && u64::from(offset) + u64::from(size) <= u64::from(whole);
+            let inside = |offset: u32, size: u32, whole: u32| {
+                size > 0 && u64::from(offset) + u64::from(size) <= u64::from(whole)
+            };
             if !inside(x, width, film.width) || !inside(y, height, film.height) {
-                let message = format!("the crop of {width} x {height} pixels at ({x}, {y}) is empty or outside the film of {} x {}", film.width, film.height);
+                let message = format!(
+                    "the crop of {width} x {height} pixels at ({x}, {y}) is empty or outside the film of {} x {}",
+                    film.width, film.height
+                );
                 out.push(Diagnostic::error("scene::crop-outside", message).at(span));
             }
         }
@@ -64,25 +77,31 @@ fn transform(m: &DMat4, what: &str, span: Option<&Span>, out: &mut Diagnostics) 
     } else {
         "is not affine: its last row must be 0 0 0 1"
     };
-    out.push(Diagnostic::error("scene::bad-transform", format!("the transform of this {what} {problem}")).at(span.cloned()));
+    out.push(
+        Diagnostic::error("scene::bad-transform", format!("the transform of this {what} {problem}")).at(span.cloned()),
+    );
 }
 
 fn meshes(scene: &SceneDesc, shapes: &[&ShapeDesc], out: &mut Diagnostics) {
     let span_of = |mesh: usize| shapes.iter().find(|s| s.mesh.index() == mesh).and_then(|s| s.span.clone());
     let (mut flat, mut first_flat) = (0u64, None);
     for (index, mesh) in scene.meshes.iter().enumerate() {
-        if let Some(v) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        if let Some(v) = mesh.positions.par_iter().position_first(|p| !p.is_finite()) {
             let message = format!("`{}`: vertex {v} is not finite", mesh.name);
             out.push(Diagnostic::error("scene::bad-mesh", message).at(span_of(index)));
             continue;
         }
-        if let Some(t) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= mesh.positions.len())) {
+        if let Some(t) =
+            mesh.triangles.par_iter().position_first(|t| t.iter().any(|&v| v as usize >= mesh.positions.len()))
+        {
             let message = format!("`{}`: triangle {t} names a vertex that is not there", mesh.name);
             out.push(Diagnostic::error("scene::bad-mesh", message).at(span_of(index)));
             continue;
         }
         let n = mesh.positions.len();
-        for (what, length) in [("normals", mesh.normals.len()), ("texture coordinates", mesh.uvs.len()), ("colours", mesh.colors.len())] {
+        for (what, length) in
+            [("normals", mesh.normals.len()), ("texture coordinates", mesh.uvs.len()), ("colours", mesh.colors.len())]
+        {
             if length != 0 && length != n {
                 let message = format!("`{}`: {length} {what} for {n} vertices", mesh.name);
                 out.push(Diagnostic::error("scene::bad-mesh", message).at(span_of(index)));
@@ -96,27 +115,22 @@ fn meshes(scene: &SceneDesc, shapes: &[&ShapeDesc], out: &mut Diagnostics) {
     }
     if let Some((mesh, triangle)) = first_flat {
         let name = &scene.meshes[mesh].name;
-        let message = format!("{flat} triangles have no area and are left out; the first is triangle {triangle} of `{name}`");
+        let message =
+            format!("{flat} triangles have no area and are left out; the first is triangle {triangle} of `{name}`");
         out.push(Diagnostic::warning("scene::flat-triangles", message).at(span_of(mesh)));
     }
 }
 
 /// How many triangles have no area, and the first of them.
 fn flat_triangles(mesh: &MeshDesc) -> (u64, usize) {
-    let (mut count, mut first) = (0, 0);
-    for (i, t) in mesh.triangles.iter().enumerate() {
+    let is_flat = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
-        // In f32: a triangle whose area rounds to zero is one that Embree cannot hit either. Subnormal products are looked at again
-        // in double precision, lest a tiny model vanish.
-        let n = (b - a).cross(c - a);
-        if n.length_squared() == 0.0 && (b - a).as_dvec3().cross((c - a).as_dvec3()).length_squared() == 0.0 {
-            if count == 0 {
-                first = i;
-            }
-            count += 1;
-        }
-    }
-    (count, first)
+        // Products that round to zero in f32 are looked at again in double precision, lest a tiny model vanish.
+        (b - a).cross(c - a).length_squared() == 0.0
+            && (b - a).as_dvec3().cross((c - a).as_dvec3()).length_squared() == 0.0
+    };
+    let found = mesh.triangles.par_iter().enumerate().filter(|(_, t)| is_flat(t)).map(|(i, _)| (1, i));
+    found.reduce(|| (0, usize::MAX), |a, b| (a.0 + b.0, a.1.min(b.1)))
 }
 
 #[cfg(test)]
@@ -203,6 +217,10 @@ mod tests {
         let mut out = Diagnostics::default();
         validate(&scene, &mut out);
         assert_eq!(out.list.len(), 1);
-        assert!(out.list[0].message.starts_with("2 triangles") && out.list[0].message.contains("triangle 1 of `one`"), "{}", out.list[0].message);
+        assert!(
+            out.list[0].message.starts_with("2 triangles") && out.list[0].message.contains("triangle 1 of `one`"),
+            "{}",
+            out.list[0].message
+        );
     }
 }

@@ -10,8 +10,22 @@ use crate::scene::diag::{Diagnostic, nearest};
 use crate::scene::{BsdfDesc, BsdfId, BsdfKind, ColorDesc, Distribution, PrincipledDesc, RoughnessDesc, WardVariant};
 
 const PLUGINS: [&str; 16] = [
-    "diffuse", "dielectric", "thindielectric", "roughdielectric", "conductor", "roughconductor", "plastic", "roughplastic", "principled",
-    "phong", "ward", "twosided", "mask", "bumpmap", "normalmap", "blendbsdf",
+    "diffuse",
+    "dielectric",
+    "thindielectric",
+    "roughdielectric",
+    "conductor",
+    "roughconductor",
+    "plastic",
+    "roughplastic",
+    "principled",
+    "phong",
+    "ward",
+    "twosided",
+    "mask",
+    "bumpmap",
+    "normalmap",
+    "blendbsdf",
 ];
 /// Plugins of old versions that are read as another one.
 const REPLACED: [(&str, &str); 2] = [("roughdiffuse", "diffuse"), ("difftrans", "diffuse")];
@@ -45,7 +59,10 @@ impl Builder<'_> {
         let p = props;
         let mut plugin = p.plugin;
         if let Some((old, new)) = REPLACED.iter().find(|(old, _)| *old == plugin) {
-            let d = Diagnostic::warning("scene::replaced-plugin", format!("`{old}` is not supported: `{new}` is used instead"));
+            let d = Diagnostic::warning(
+                "scene::replaced-plugin",
+                format!("`{old}` is not supported: `{new}` is used instead"),
+            );
             self.push(d.at(p.element().span_of("type")));
             p.ignore(&["alpha", "use_fast_approx", "transmittance"]);
             plugin = new;
@@ -61,21 +78,39 @@ impl Builder<'_> {
             }
             "thindielectric" => {
                 let (specular_reflectance, specular_transmittance) = self.tints(p);
-                BsdfKind::ThinDielectric { eta: self.relative_ior(p, BK7), specular_reflectance, specular_transmittance }
+                BsdfKind::ThinDielectric {
+                    eta: self.relative_ior(p, BK7),
+                    specular_reflectance,
+                    specular_transmittance,
+                }
             }
             "roughdielectric" => {
                 let (specular_reflectance, specular_transmittance) = self.tints(p);
                 let roughness = self.roughness(p);
-                BsdfKind::RoughDielectric { roughness, eta: self.relative_ior(p, BK7), specular_reflectance, specular_transmittance }
+                BsdfKind::RoughDielectric {
+                    roughness,
+                    eta: self.relative_ior(p, BK7),
+                    specular_reflectance,
+                    specular_transmittance,
+                }
             }
             "conductor" => {
                 let (eta, k) = self.metal(p);
-                BsdfKind::Conductor { eta, k, specular_reflectance: self.color(p, "specular_reflectance", 1.0, Reflectance) }
+                BsdfKind::Conductor {
+                    eta,
+                    k,
+                    specular_reflectance: self.color(p, "specular_reflectance", 1.0, Reflectance),
+                }
             }
             "roughconductor" => {
                 let (eta, k) = self.metal(p);
                 let roughness = self.roughness(p);
-                BsdfKind::RoughConductor { roughness, eta, k, specular_reflectance: self.color(p, "specular_reflectance", 1.0, Reflectance) }
+                BsdfKind::RoughConductor {
+                    roughness,
+                    eta,
+                    k,
+                    specular_reflectance: self.color(p, "specular_reflectance", 1.0, Reflectance),
+                }
             }
             "plastic" => BsdfKind::Plastic {
                 eta: self.relative_ior(p, POLYPROPYLENE),
@@ -98,7 +133,11 @@ impl Builder<'_> {
             },
             "ward" => {
                 let both = p.has("alpha");
-                let variants = [("balanced", WardVariant::Balanced), ("ward", WardVariant::Ward), ("ward-duer", WardVariant::WardDuer)];
+                let variants = [
+                    ("balanced", WardVariant::Balanced),
+                    ("ward", WardVariant::Ward),
+                    ("ward-duer", WardVariant::WardDuer),
+                ];
                 BsdfKind::Ward {
                     alpha_u: self.scalar(p, if both { "alpha" } else { "alpha_u" }, 0.1),
                     alpha_v: self.scalar(p, if both { "alpha" } else { "alpha_v" }, 0.1),
@@ -139,7 +178,10 @@ impl Builder<'_> {
     }
 
     fn tints(&mut self, p: &Props<'_>) -> (ColorDesc, ColorDesc) {
-        (self.color(p, "specular_reflectance", 1.0, Reflectance), self.color(p, "specular_transmittance", 1.0, Reflectance))
+        (
+            self.color(p, "specular_reflectance", 1.0, Reflectance),
+            self.color(p, "specular_transmittance", 1.0, Reflectance),
+        )
     }
 
     /// Nested materials, named or not, in the order of the file.
@@ -152,14 +194,20 @@ impl Builder<'_> {
                 (a, b) => format!("{a} or {b} nested <bsdf>s"),
             };
             let message = format!("`{}` needs {expected}, found {}", p.plugin, objects.len());
-            self.push(Diagnostic::error("scene::nested-bsdf", message).at(p.span()).label(format!("expected {expected}")));
+            self.push(
+                Diagnostic::error("scene::nested-bsdf", message).at(p.span()).label(format!("expected {expected}")),
+            );
             return None;
         }
         objects.into_iter().map(|o| self.bsdf(o)).collect::<Vec<_>>().into_iter().collect()
     }
 
     /// A texture of plain numbers (with or without one of the given names) and one material.
-    fn texture_and_nested(&mut self, p: &Props<'_>, names: [&'static str; 2]) -> Option<(crate::scene::TextureId, BsdfId)> {
+    fn texture_and_nested(
+        &mut self,
+        p: &Props<'_>,
+        names: [&'static str; 2],
+    ) -> Option<(crate::scene::TextureId, BsdfId)> {
         let mut texture = names.into_iter().find_map(|n| p.get_index(n));
         let mut nested = Vec::new();
         for object in p.objects() {
@@ -183,7 +231,10 @@ impl Builder<'_> {
         if let Some(node) = p.get("distribution")
             && node.attr("value").is_some_and(|a| matches!(a.value.as_str(), "phong" | "as"))
         {
-            let d = Diagnostic::warning("scene::replaced-distribution", "this distribution of normals is not supported: ggx is used");
+            let d = Diagnostic::warning(
+                "scene::replaced-distribution",
+                "this distribution of normals is not supported: ggx is used",
+            );
             self.push(d.at(node.span_of("value")));
             choices.extend([("phong", Distribution::Ggx), ("as", Distribution::Ggx)]);
         }

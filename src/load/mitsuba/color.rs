@@ -17,7 +17,12 @@ impl Builder<'_> {
     }
 
     /// A colour or texture, if the property is there and right.
-    pub(super) fn optional_color(&mut self, props: &Props<'_>, name: &'static str, purpose: Purpose) -> Option<ColorDesc> {
+    pub(super) fn optional_color(
+        &mut self,
+        props: &Props<'_>,
+        name: &'static str,
+        purpose: Purpose,
+    ) -> Option<ColorDesc> {
         let given = props.get_index(name)?;
         let object = self.resolve(given)?;
         let node = self.node(object);
@@ -62,7 +67,10 @@ impl Builder<'_> {
             ("spectrum", Some(text)) => spectrum::parse(text, purpose),
             ("spectrum", None) if node.attr("filename").is_some() => return self.spectrum_file(node, purpose),
             ("float" | "integer" | "rgb" | "srgb" | "spectrum", None) => {
-                let d = Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `value`", node.tag));
+                let d = Diagnostic::error(
+                    "scene::missing-attribute",
+                    format!("<{}> needs the attribute `value`", node.tag),
+                );
                 self.push(d.at(node.span.clone()));
                 return None;
             }
@@ -105,7 +113,8 @@ impl Builder<'_> {
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
             Err(e) => {
-                let d = Diagnostic::error("load::io", format!("cannot read `{}`: {e}", path.display())).at(attr.span.clone());
+                let d = Diagnostic::error("load::io", format!("cannot read `{}`: {e}", path.display()))
+                    .at(attr.span.clone());
                 self.report.borrow_mut().push_io(d);
                 return None;
             }
@@ -124,7 +133,11 @@ impl Builder<'_> {
             }
         }
         spectrum::from_samples(&samples, purpose)
-            .map_err(|m| self.push(Diagnostic::error("scene::bad-value", format!("`{}`: {m}", path.display())).at(attr.span.clone())))
+            .map_err(|m| {
+                self.push(
+                    Diagnostic::error("scene::bad-value", format!("`{}`: {m}", path.display())).at(attr.span.clone()),
+                )
+            })
             .ok()
     }
 }

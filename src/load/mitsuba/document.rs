@@ -54,11 +54,35 @@ pub(super) struct Tree {
 const MAX_DEPTH: usize = 64;
 
 /// Elements that stand for plugins.
-pub(super) const OBJECT_TAGS: [&str; 12] =
-    ["bsdf", "texture", "shape", "emitter", "sensor", "film", "sampler", "rfilter", "integrator", "medium", "volume", "phase"];
+pub(super) const OBJECT_TAGS: [&str; 12] = [
+    "bsdf",
+    "texture",
+    "shape",
+    "emitter",
+    "sensor",
+    "film",
+    "sampler",
+    "rfilter",
+    "integrator",
+    "medium",
+    "volume",
+    "phase",
+];
 /// Elements that stand for values.
-pub(super) const VALUE_TAGS: [&str; 12] =
-    ["integer", "float", "string", "boolean", "rgb", "srgb", "spectrum", "blackbody", "point", "vector", "transform", "ref"];
+pub(super) const VALUE_TAGS: [&str; 12] = [
+    "integer",
+    "float",
+    "string",
+    "boolean",
+    "rgb",
+    "srgb",
+    "spectrum",
+    "blackbody",
+    "point",
+    "vector",
+    "transform",
+    "ref",
+];
 const OTHER_TAGS: [&str; 5] = ["scene", "default", "include", "alias", "path"];
 const TRANSFORM_TAGS: [&str; 6] = ["translate", "rotate", "scale", "lookat", "matrix", "lookAt"];
 /// Nested objects of old versions that hold nothing we use.
@@ -79,8 +103,11 @@ pub(super) fn load(path: &Path, definitions: &[(String, String)], report: &mut R
     for (name, _) in definitions {
         if let Some((_, false)) = loader.parameters.get(name) {
             loader.report.push(
-                Diagnostic::warning("scene::unused-definition", format!("the definition `{name}` (-D) is not used in the scene"))
-                    .help(format!("a scene uses it as ${name}")),
+                Diagnostic::warning(
+                    "scene::unused-definition",
+                    format!("the definition `{name}` (-D) is not used in the scene"),
+                )
+                .help(format!("a scene uses it as ${name}")),
             );
         }
     }
@@ -115,7 +142,10 @@ impl Loader<'_> {
             }
         };
         let text = String::from_utf8(text).unwrap_or_else(|e| {
-            let d = Diagnostic::warning("scene::not-utf8", format!("`{}` is not UTF-8 throughout; unknown characters are replaced", path.display()));
+            let d = Diagnostic::warning(
+                "scene::not-utf8",
+                format!("`{}` is not UTF-8 throughout; unknown characters are replaced", path.display()),
+            );
             self.report.push(d);
             String::from_utf8_lossy(e.as_bytes()).into_owned()
         });
@@ -139,7 +169,8 @@ impl Loader<'_> {
                 // The library ends its sentence with the position, which is shown anyway.
                 let message = e.to_string();
                 let message = message.split(" at ").next().unwrap_or(&message).to_owned();
-                self.report.push(Diagnostic::error("scene::syntax", format!("not well-formed XML: {message}")).at(span));
+                self.report
+                    .push(Diagnostic::error("scene::syntax", format!("not well-formed XML: {message}")).at(span));
                 return None;
             }
         };
@@ -161,7 +192,8 @@ impl Loader<'_> {
         let major = attr.value().split('.').next().and_then(|v| v.trim().parse::<u32>().ok());
         if major.is_none() {
             let d = Diagnostic::error("scene::bad-value", format!("`{}` is not a version", attr.value()));
-            self.report.push(d.at(Span { source: source.clone(), range: attr.range_value() }).label("expected e.g. 3.0.0"));
+            self.report
+                .push(d.at(Span { source: source.clone(), range: attr.range_value() }).label("expected e.g. 3.0.0"));
         }
         major.is_some_and(|m| m < 2)
     }
@@ -173,7 +205,10 @@ impl Loader<'_> {
         let known = OBJECT_TAGS.iter().chain(&VALUE_TAGS).chain(&OTHER_TAGS).chain(&TRANSFORM_TAGS).copied();
         if !known.clone().any(|k| k == tag) {
             if tag == SUBSURFACE {
-                self.report.push(Diagnostic::warning("scene::ignored-element", "subsurface scattering is not supported: ignored").at(span));
+                self.report.push(
+                    Diagnostic::warning("scene::ignored-element", "subsurface scattering is not supported: ignored")
+                        .at(span),
+                );
             } else {
                 let mut d = Diagnostic::error("scene::unknown-element", format!("unknown element <{tag}>")).at(span);
                 if let Some(near) = nearest(tag, known) {
@@ -265,7 +300,10 @@ impl Loader<'_> {
     fn required<const N: usize>(&mut self, node: &Node, names: [&str; N]) -> Option<[Attr; N]> {
         let found = names.map(|name| {
             if node.attr(name).is_none() {
-                let d = Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `{name}`", node.tag));
+                let d = Diagnostic::error(
+                    "scene::missing-attribute",
+                    format!("<{}> needs the attribute `{name}`", node.tag),
+                );
                 self.report.push(d.at(node.span.clone()));
             }
             node.attr(name).cloned()
@@ -291,9 +329,14 @@ impl Loader<'_> {
                 out.push_str(value);
             } else {
                 let known: Vec<&str> = self.parameters.keys().map(String::as_str).collect();
-                let mut d = Diagnostic::error("scene::undefined-parameter", format!("the parameter `${name}` is not defined"))
-                    .at(span.clone())
-                    .help(format!("define it with -D {name}=VALUE or <default name=\"{name}\" value=\"…\"/> before its first use"));
+                let mut d = Diagnostic::error(
+                    "scene::undefined-parameter",
+                    format!("the parameter `${name}` is not defined"),
+                )
+                .at(span.clone())
+                .help(format!(
+                    "define it with -D {name}=VALUE or <default name=\"{name}\" value=\"…\"/> before its first use"
+                ));
                 if let Some(near) = nearest(name, known) {
                     d = d.label(format!("did you mean `${near}`?"));
                 }
@@ -310,7 +353,8 @@ impl Loader<'_> {
         for (id, alias) in std::mem::take(&mut self.aliases) {
             match self.tree.ids.get(&id.value).copied() {
                 None => {
-                    let d = Diagnostic::error("scene::undefined-reference", format!("nothing has the id `{}`", id.value));
+                    let d =
+                        Diagnostic::error("scene::undefined-reference", format!("nothing has the id `{}`", id.value));
                     self.report.push(d.at(id.span));
                 }
                 Some(_) if self.tree.ids.contains_key(&alias.value) => {
@@ -328,7 +372,10 @@ impl Loader<'_> {
 /// Where a file named in the scene is: relative names are looked for in the scene's folders in turn.
 pub(super) fn find_file(folders: &[PathBuf], name: &str) -> PathBuf {
     let candidates = folders.iter().map(|f| f.join(name));
-    candidates.clone().find(|p| p.exists()).unwrap_or_else(|| candidates.into_iter().next().unwrap_or_else(|| name.into()))
+    candidates
+        .clone()
+        .find(|p| p.exists())
+        .unwrap_or_else(|| candidates.into_iter().next().unwrap_or_else(|| name.into()))
 }
 
 /// The start tag of an element, without what it encloses.

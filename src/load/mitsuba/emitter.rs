@@ -36,7 +36,10 @@ impl Builder<'_> {
             },
             "spot" => {
                 if let Some(node) = p.get("texture") {
-                    self.push(Diagnostic::warning("scene::ignored-property", "a spot light's `texture` is ignored").at(node.span.clone()));
+                    self.push(
+                        Diagnostic::warning("scene::ignored-property", "a spot light's `texture` is ignored")
+                            .at(node.span.clone()),
+                    );
                 }
                 let cutoff = p.positive_or("cutoff_angle", 20.0);
                 EmitterKind::Spot {
@@ -74,7 +77,8 @@ impl Builder<'_> {
     fn sun_sky(&mut self, p: &Props<'_>, to_world: DMat4) -> EmitterKind {
         let legacy = p.element().legacy;
         let given = p.vector("sun_direction").map(|d| if legacy { sun::from_y_up(d) } else { d });
-        let sun_direction = given.and_then(DVec3::try_normalize).unwrap_or_else(|| sun::direction(&sun::when_and_where(p), legacy));
+        let sun_direction =
+            given.and_then(DVec3::try_normalize).unwrap_or_else(|| sun::direction(&sun::when_and_where(p), legacy));
         let turbidity = p.float_or("turbidity", 3.0);
         if !(1.0..=10.0).contains(&turbidity)
             && let Some(node) = p.get("turbidity")

@@ -33,7 +33,8 @@ use std::path::Path;
 pub(super) use transform::look_at;
 
 /// What may stand directly in a scene.
-const TOP_LEVEL: [&str; 10] = ["integrator", "sensor", "bsdf", "texture", "shape", "emitter", "medium", "volume", "ref", "spectrum"];
+const TOP_LEVEL: [&str; 10] =
+    ["integrator", "sensor", "bsdf", "texture", "shape", "emitter", "medium", "volume", "ref", "spectrum"];
 
 /// Reads the file and everything it names.
 pub(super) fn load(path: &Path, options: &LoadOptions, report: &mut Report) -> Option<SceneDesc> {
@@ -74,7 +75,11 @@ impl Builder<'_> {
                 "medium" | "volume" => self.ignored_medium(child),
                 "ref" | "spectrum" => {}
                 tag => {
-                    let d = Diagnostic::error("scene::misplaced-element", format!("<{tag}> has no place directly in a scene")).at(node.span.clone());
+                    let d = Diagnostic::error(
+                        "scene::misplaced-element",
+                        format!("<{tag}> has no place directly in a scene"),
+                    )
+                    .at(node.span.clone());
                     self.push(d.help(format!("expected one of: {}", TOP_LEVEL.join(", "))));
                 }
             }
@@ -103,12 +108,16 @@ impl Builder<'_> {
                 Some((child.attr("name")?.value.clone(), value.value.clone(), Some(value.span.clone())))
             })
             .collect();
-        self.scene.integrator = Some(IntegratorDesc { name: name.to_owned(), params, span: Some(element.span.clone()) });
+        self.scene.integrator =
+            Some(IntegratorDesc { name: name.to_owned(), params, span: Some(element.span.clone()) });
     }
 
     fn ignored_medium(&mut self, node: usize) {
         let node = &self.tree.nodes[node];
-        let d = Diagnostic::warning("scene::medium-ignored", format!("participating media are not supported: this <{}> is ignored", node.tag));
+        let d = Diagnostic::warning(
+            "scene::medium-ignored",
+            format!("participating media are not supported: this <{}> is ignored", node.tag),
+        );
         self.push(d.at(node.span.clone()));
     }
 }

@@ -60,12 +60,15 @@ impl<'t> Builder<'t> {
             return Some(index);
         }
         let Some(id) = node.attr("id") else {
-            self.push(Diagnostic::error("scene::missing-attribute", "<ref> needs the attribute `id`").at(node.span.clone()));
+            self.push(
+                Diagnostic::error("scene::missing-attribute", "<ref> needs the attribute `id`").at(node.span.clone()),
+            );
             return None;
         };
         let found = self.tree.ids.get(&id.value).copied();
         if found.is_none() {
-            let mut d = Diagnostic::error("scene::undefined-reference", format!("nothing has the id `{}`", id.value)).at(id.span.clone());
+            let mut d = Diagnostic::error("scene::undefined-reference", format!("nothing has the id `{}`", id.value))
+                .at(id.span.clone());
             if let Some(near) = nearest(&id.value, self.tree.ids.keys().map(String::as_str)) {
                 d = d.label(format!("did you mean `{near}`?"));
             }
@@ -75,7 +78,12 @@ impl<'t> Builder<'t> {
     }
 
     /// Runs `build` for an object unless it is being built already, i.e. contains itself. `from` is the element that led here.
-    pub(super) fn guarded<T>(&mut self, object: usize, from: usize, build: impl FnOnce(&mut Self) -> Option<T>) -> Option<T> {
+    pub(super) fn guarded<T>(
+        &mut self,
+        object: usize,
+        from: usize,
+        build: impl FnOnce(&mut Self) -> Option<T>,
+    ) -> Option<T> {
         if self.open.contains(&object) || self.open.len() >= MAX_CHAIN {
             let id = self.node(object).attr("id").map_or("", |a| a.value.as_str());
             let d = Diagnostic::error("scene::circular-reference", format!("`{id}` contains itself"));
@@ -103,7 +111,10 @@ impl<'t> Builder<'t> {
     /// The path and place of a file that a plugin names.
     pub(super) fn file(&self, props: &Props<'_>, name: &'static str) -> Option<(PathBuf, Span)> {
         if !props.has(name) {
-            props.error("scene::missing-property", format!("the {} plugin `{}` needs `{name}`", props.element().tag, props.plugin));
+            props.error(
+                "scene::missing-property",
+                format!("the {} plugin `{}` needs `{name}`", props.element().tag, props.plugin),
+            );
             return None;
         }
         let text = props.string(name)?;

@@ -33,7 +33,8 @@ impl<'t> Props<'t> {
         let element = &tree.nodes[node];
         let found = element.attr("type").map(|a| a.value.as_str());
         if found.is_none() {
-            let d = Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `type`", element.tag));
+            let d =
+                Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `type`", element.tag));
             report.borrow_mut().push(d.at(element.span.clone()));
         }
         found
@@ -48,20 +49,25 @@ impl<'t> Props<'t> {
             let element = &tree.nodes[child];
             let name = element.attr("name").map(|a| a.value.clone());
             if name.is_none() && element.tag != "ref" && !OBJECT_TAGS.contains(&element.tag.as_str()) {
-                let d = Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `name`", element.tag));
+                let d = Diagnostic::error(
+                    "scene::missing-attribute",
+                    format!("<{}> needs the attribute `name`", element.tag),
+                );
                 report.borrow_mut().push(d.at(element.span.clone()));
                 continue;
             }
             if !OBJECT_TAGS.contains(&element.tag.as_str()) {
                 check_attributes(element, report);
             }
-            if let Some(name) = &name
-                && items.iter().any(|i| i.name.as_ref() == Some(name))
-            {
-                let d = Diagnostic::error("scene::duplicate-property", format!("`{name}` is given twice"));
-                report.borrow_mut().push(d.at(element.span_of("name")));
+            let twice = items.iter().any(|i| name.is_some() && i.name == name);
+            if twice {
+                let message = format!("`{}` is given twice", name.as_deref().unwrap_or(""));
+                report
+                    .borrow_mut()
+                    .push(Diagnostic::error("scene::duplicate-property", message).at(element.span_of("name")));
             }
-            items.push(Item { name, node: child, used: Cell::new(false) });
+            // The second of two counts as seen: one message is enough.
+            items.push(Item { name, node: child, used: Cell::new(twice) });
         }
         Some(Props { tree, report, node, plugin, items, asked: RefCell::default() })
     }
@@ -119,12 +125,14 @@ impl<'t> Props<'t> {
     /// Reports that a property's element is of the wrong kind.
     pub(super) fn wrong_type(&self, node: &Node, expected: &str) {
         let name = node.attr("name").map_or("", |a| a.value.as_str());
-        let d = Diagnostic::error("scene::wrong-type", format!("`{name}` is a <{}>, but {expected} is expected", node.tag));
+        let d =
+            Diagnostic::error("scene::wrong-type", format!("`{name}` is a <{}>, but {expected} is expected", node.tag));
         self.report.borrow_mut().push(d.at(node.span.clone()).label(format!("expected {expected}")));
     }
 
     pub(super) fn bad_value(&self, node: &Node, attr: &str, message: String, expected: &str) {
-        let d = Diagnostic::error("scene::bad-value", message).at(node.span_of(attr)).label(format!("expected {expected}"));
+        let d =
+            Diagnostic::error("scene::bad-value", message).at(node.span_of(attr)).label(format!("expected {expected}"));
         self.report.borrow_mut().push(d);
     }
 
@@ -132,7 +140,8 @@ impl<'t> Props<'t> {
     pub(super) fn value_of(&self, node: &'t Node) -> Option<&'t str> {
         let found = node.attr("value");
         if found.is_none() {
-            let d = Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `value`", node.tag));
+            let d =
+                Diagnostic::error("scene::missing-attribute", format!("<{}> needs the attribute `value`", node.tag));
             self.report.borrow_mut().push(d.at(node.span.clone()));
         }
         found.map(|a| a.value.as_str())
@@ -172,7 +181,9 @@ impl<'t> Props<'t> {
             return None;
         }
         let text = self.value_of(node)?.trim();
-        text.parse().map_err(|_| self.bad_value(node, "value", format!("`{text}` is not a whole number"), "a whole number")).ok()
+        text.parse()
+            .map_err(|_| self.bad_value(node, "value", format!("`{text}` is not a whole number"), "a whole number"))
+            .ok()
     }
 
     /// A whole number of 0 … 2^32 − 1.
@@ -221,7 +232,12 @@ impl<'t> Props<'t> {
         }
         let words: Vec<&str> = choices.iter().map(|(w, _)| *w).collect();
         if let Some(node) = self.get(name) {
-            self.bad_value(node, "value", format!("`{text}` is not a value of `{name}`"), &format!("one of: {}", words.join(", ")));
+            self.bad_value(
+                node,
+                "value",
+                format!("`{text}` is not a value of `{name}`"),
+                &format!("one of: {}", words.join(", ")),
+            );
         }
         default
     }
@@ -264,8 +280,11 @@ impl<'t> Props<'t> {
             let node = &self.tree.nodes[item.node];
             let name = item.name.as_deref().unwrap_or("");
             let what = if name.is_empty() { format!("<{}>", node.tag) } else { format!("property `{name}`") };
-            let mut d = Diagnostic::warning("scene::unknown-property", format!("the plugin `{}` knows no {what}: ignored", self.plugin))
-                .at(node.span_of("name"));
+            let mut d = Diagnostic::warning(
+                "scene::unknown-property",
+                format!("the plugin `{}` knows no {what}: ignored", self.plugin),
+            )
+            .at(node.span_of("name"));
             if let Some(near) = nearest(name, asked.iter().copied()) {
                 d = d.label(format!("did you mean `{near}`?"));
             }
@@ -287,7 +306,10 @@ fn check_attributes(node: &Node, report: &RefCell<Report>) {
         _ => &["type", "id", "name", "version"],
     };
     for attr in node.attrs.iter().filter(|a| !known.contains(&a.name.as_str())) {
-        let mut d = Diagnostic::warning("scene::unknown-attribute", format!("<{}> has no attribute `{}`: ignored", node.tag, attr.name));
+        let mut d = Diagnostic::warning(
+            "scene::unknown-attribute",
+            format!("<{}> has no attribute `{}`: ignored", node.tag, attr.name),
+        );
         d = d.at(attr.span.clone());
         if let Some(near) = nearest(&attr.name, known.iter().copied()) {
             d = d.label(format!("did you mean `{near}`?"));

@@ -30,7 +30,8 @@ impl Builder<'_> {
         if thin && !p.has("aperture_radius") {
             p.error("scene::missing-property", "a `thinlens` needs `aperture_radius`");
         }
-        let principal_point = [p.float_or("principal_point_offset_x", 0.0), p.float_or("principal_point_offset_y", 0.0)];
+        let principal_point =
+            [p.float_or("principal_point_offset_x", 0.0), p.float_or("principal_point_offset_y", 0.0)];
         let to_world = p.transform("to_world").unwrap_or(DMat4::IDENTITY);
         p.ignore(&["shutter_open", "shutter_close", "kc"]);
 
@@ -41,16 +42,24 @@ impl Builder<'_> {
                 "film" => film = self.film(object),
                 "sampler" => sample_count = self.sampler(object),
                 "medium" => self.push(
-                    Diagnostic::warning("scene::medium-ignored", "participating media are not supported: ignored").at(self.node(object).span.clone()),
+                    Diagnostic::warning("scene::medium-ignored", "participating media are not supported: ignored")
+                        .at(self.node(object).span.clone()),
                 ),
                 tag => {
-                    let d = Diagnostic::error("scene::misplaced-element", format!("a <{tag}> has no place in a <sensor>"));
+                    let d =
+                        Diagnostic::error("scene::misplaced-element", format!("a <{tag}> has no place in a <sensor>"));
                     self.push(d.at(self.node(object).span.clone()).label("expected <film> or <sampler>"));
                 }
             }
         }
         p.finish();
-        let film = film.unwrap_or(FilmDesc { width: 768, height: 576, crop: None, filter: FilterDesc::Gaussian { stddev: 0.5 }, span: None });
+        let film = film.unwrap_or(FilmDesc {
+            width: 768,
+            height: 576,
+            crop: None,
+            filter: FilterDesc::Gaussian { stddev: 0.5 },
+            span: None,
+        });
         Some(SensorDesc {
             to_world,
             fov,
@@ -97,7 +106,17 @@ impl Builder<'_> {
             let [x, y] = offset.map(|v| v.unwrap_or(0));
             [x, y, size[0].unwrap_or(width.saturating_sub(x)), size[1].unwrap_or(height.saturating_sub(y))]
         });
-        p.ignore(&["pixel_format", "component_format", "file_format", "banner", "gamma", "exposure", "high_quality_edges", "sample_border", "compensate"]);
+        p.ignore(&[
+            "pixel_format",
+            "component_format",
+            "file_format",
+            "banner",
+            "gamma",
+            "exposure",
+            "high_quality_edges",
+            "sample_border",
+            "compensate",
+        ]);
         p.ignore(&["attach_log", "tonemap_method", "key", "burn", "filename", "variable", "digits"]);
         let mut filter = FilterDesc::Gaussian { stddev: 0.5 };
         for object in p.objects() {
@@ -105,7 +124,10 @@ impl Builder<'_> {
             if self.node(object).tag == "rfilter" {
                 filter = self.filter(object).unwrap_or(filter);
             } else {
-                let d = Diagnostic::error("scene::misplaced-element", format!("a <{}> has no place in a <film>", self.node(object).tag));
+                let d = Diagnostic::error(
+                    "scene::misplaced-element",
+                    format!("a <{}> has no place in a <film>", self.node(object).tag),
+                );
                 self.push(d.at(self.node(object).span.clone()).label("expected <rfilter>"));
             }
         }
@@ -127,12 +149,18 @@ impl Builder<'_> {
             }
             "mitchell" => {
                 let third = 1.0 / 3.0;
-                FilterDesc::Mitchell { b: p.float_or(either(&p, "B", "b"), third) as f32, c: p.float_or(either(&p, "C", "c"), third) as f32 }
+                FilterDesc::Mitchell {
+                    b: p.float_or(either(&p, "B", "b"), third) as f32,
+                    c: p.float_or(either(&p, "C", "c"), third) as f32,
+                }
             }
             "catmullrom" => FilterDesc::Mitchell { b: 0.0, c: 0.5 },
             "lanczos" => {
                 p.ignore(&["lobes"]);
-                let d = Diagnostic::warning("scene::replaced-plugin", "the filter `lanczos` is not supported: `gaussian` is used instead");
+                let d = Diagnostic::warning(
+                    "scene::replaced-plugin",
+                    "the filter `lanczos` is not supported: `gaussian` is used instead",
+                );
                 self.push(d.at(p.element().span_of("type")));
                 FilterDesc::Gaussian { stddev: 0.5 }
             }

@@ -12,7 +12,8 @@ use crate::scene::diag::Diagnostic;
 use crate::scene::{AreaEmission, GroupDesc, GroupId, InstanceDesc, ShapeDesc};
 use glam::{DMat4, DVec3};
 
-const PLUGINS: [&str; 10] = ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance"];
+const PLUGINS: [&str; 10] =
+    ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance"];
 
 impl Builder<'_> {
     /// A `<shape>` that stands in the scene itself.
@@ -64,7 +65,10 @@ impl Builder<'_> {
             for child in p.objects() {
                 let Some(child) = b.resolve(child) else { continue };
                 if b.node(child).tag != "shape" {
-                    let d = Diagnostic::error("scene::misplaced-element", format!("a <{}> has no place in a shapegroup", b.node(child).tag));
+                    let d = Diagnostic::error(
+                        "scene::misplaced-element",
+                        format!("a <{}> has no place in a shapegroup", b.node(child).tag),
+                    );
                     b.push(d.at(b.node(child).span.clone()).label("expected a <shape>"));
                     continue;
                 }
@@ -139,11 +143,15 @@ impl Builder<'_> {
                 "bsdf" => bsdf = self.bsdf(object),
                 "emitter" => emission = self.area_emission(found),
                 "medium" => {
-                    let d = Diagnostic::warning("scene::medium-ignored", "participating media are not supported: this one is ignored");
+                    let d = Diagnostic::warning(
+                        "scene::medium-ignored",
+                        "participating media are not supported: this one is ignored",
+                    );
                     self.push(d.at(self.node(object).span.clone()));
                 }
                 tag => {
-                    let d = Diagnostic::error("scene::misplaced-element", format!("a <{tag}> has no place in a <shape>"));
+                    let d =
+                        Diagnostic::error("scene::misplaced-element", format!("a <{tag}> has no place in a <shape>"));
                     self.push(d.at(self.node(object).span.clone()).label("expected <bsdf> or <emitter>"));
                 }
             }
@@ -158,7 +166,10 @@ impl Builder<'_> {
         debug_assert!(OBJECT_TAGS.contains(&self.node(node).tag.as_str()));
         let p = self.props(node)?;
         if p.plugin != "area" {
-            let d = Diagnostic::error("scene::misplaced-element", format!("an emitter of type `{}` has no place in a <shape>", p.plugin));
+            let d = Diagnostic::error(
+                "scene::misplaced-element",
+                format!("an emitter of type `{}` has no place in a <shape>", p.plugin),
+            );
             self.push(d.at(p.element().span_of("type")).label("expected `area`"));
             return None;
         }

@@ -22,8 +22,17 @@ pub(super) struct Moment {
 }
 
 /// The defaults are Mitsuba's: Tokyo, 10 July 2010, three o'clock.
-const DEFAULT: Moment =
-    Moment { latitude: 35.6894, longitude: 139.6917, timezone: 9.0, year: 2010, month: 7, day: 10, hour: 15.0, minute: 0.0, second: 0.0 };
+const DEFAULT: Moment = Moment {
+    latitude: 35.6894,
+    longitude: 139.6917,
+    timezone: 9.0,
+    year: 2010,
+    month: 7,
+    day: 10,
+    hour: 15.0,
+    minute: 0.0,
+    second: 0.0,
+};
 
 /// Reads place and moment from a plugin's properties.
 pub(super) fn when_and_where(p: &Props<'_>) -> Moment {
@@ -76,7 +85,9 @@ fn zenith_and_azimuth(m: &Moment) -> (f64, f64) {
     let omega = 2.1429 - 0.001_039_459_4 * days;
     let mean_longitude = 4.895_063_0 + 0.017_202_791_698 * days;
     let anomaly = 6.240_060_0 + 0.017_201_969_9 * days;
-    let longitude = mean_longitude + 0.033_416_07 * anomaly.sin() + 0.000_348_94 * (2.0 * anomaly).sin() - 0.000_113_4 - 0.000_020_3 * omega.sin();
+    let longitude = mean_longitude + 0.033_416_07 * anomaly.sin() + 0.000_348_94 * (2.0 * anomaly).sin()
+        - 0.000_113_4
+        - 0.000_020_3 * omega.sin();
     let obliquity = 0.409_092_8 - 6.214_0e-9 * days + 0.000_039_6 * omega.cos();
 
     let right_ascension = (obliquity.cos() * longitude.sin()).atan2(longitude.cos());
@@ -84,7 +95,9 @@ fn zenith_and_azimuth(m: &Moment) -> (f64, f64) {
     let sidereal = (6.697_424_324_2 + 0.065_709_828_3 * days + hours) * 15.0 + m.longitude;
     let hour_angle = sidereal.to_radians() - right_ascension;
     let latitude = m.latitude.to_radians();
-    let zenith = (latitude.cos() * hour_angle.cos() * declination.cos() + declination.sin() * latitude.sin()).clamp(-1.0, 1.0).acos();
+    let zenith = (latitude.cos() * hour_angle.cos() * declination.cos() + declination.sin() * latitude.sin())
+        .clamp(-1.0, 1.0)
+        .acos();
     let azimuth = (-hour_angle.sin()).atan2(declination.tan() * latitude.cos() - latitude.sin() * hour_angle.cos());
     // Seen from the surface, not the centre, of the earth: mean radius over the astronomical unit, in km.
     (zenith + 6371.01 / 149_597_890.0 * zenith.sin(), azimuth)

@@ -10,7 +10,11 @@ use std::io::Read;
 const MAX_LINE: usize = 1 << 20;
 
 /// Reads all elements.
-pub(super) fn read_body<R: Read + Send>(header: &Header, stream: &mut Stream<R>, builder: &mut Builder) -> Result<(), MeshError> {
+pub(super) fn read_body<R: Read + Send>(
+    header: &Header,
+    stream: &mut Stream<R>,
+    builder: &mut Builder,
+) -> Result<(), MeshError> {
     let mut line = header.lines;
     for element in &header.elements {
         match element.name.as_str() {
@@ -71,7 +75,10 @@ fn each_number<R: Read + Send>(
     let text = loop {
         *line += 1;
         let Some(text) = stream.line(MAX_LINE)? else {
-            return Err(MeshError::new(Place::Line(*line), format!("truncated: the file ends within the `{}` rows", element.name)));
+            return Err(MeshError::new(
+                Place::Line(*line),
+                format!("truncated: the file ends within the `{}` rows", element.name),
+            ));
         };
         if !text.trim_ascii().is_empty() {
             break text;
@@ -81,7 +88,9 @@ fn each_number<R: Read + Send>(
     let text = std::str::from_utf8(text).map_err(|_| bad("not text".into()))?;
     let mut words = text.split_ascii_whitespace();
     let mut number = |name: &str| {
-        let word = words.next().ok_or_else(|| bad(format!("`{name}` is missing: the row of `{}` is too short", element.name)))?;
+        let word = words
+            .next()
+            .ok_or_else(|| bad(format!("`{name}` is missing: the row of `{}` is too short", element.name)))?;
         word.parse::<f64>().map_err(|_| bad(format!("`{word}` is not a number")))
     };
     for (index, property) in element.properties.iter().enumerate() {

@@ -72,11 +72,17 @@ impl<R: Read + Send> Stream<R> {
     fn need(&mut self, count: usize, what: &str) -> Result<(), MeshError> {
         // Checked first, so that a length from a broken file cannot grow the buffer.
         if count as u64 > self.remaining() {
-            return Err(MeshError::new(Place::Byte(self.position()), format!("truncated: the file ends within the `{what}` rows")));
+            return Err(MeshError::new(
+                Place::Byte(self.position()),
+                format!("truncated: the file ends within the `{what}` rows"),
+            ));
         }
         while self.end - self.begin < count {
             if !self.fill()? {
-                return Err(MeshError::new(Place::Byte(self.base + self.end as u64), format!("truncated: the file ends within the `{what}` rows")));
+                return Err(MeshError::new(
+                    Place::Byte(self.base + self.end as u64),
+                    format!("truncated: the file ends within the `{what}` rows"),
+                ));
             }
         }
         Ok(())
@@ -140,9 +146,10 @@ macro_rules! order {
 order!(Little, from_le_bytes);
 order!(Big, from_be_bytes);
 
-/// The `N` bytes at `offset`. The caller has made sure that they are there.
+/// The `N` bytes at `offset`, which the caller has made sure are there. (One test and one load: this is the innermost loop.)
+#[inline(always)]
 fn bytes<const N: usize>(row: &[u8], offset: usize) -> [u8; N] {
-    std::array::from_fn(|i| row[offset + i])
+    row.get(offset..offset + N).and_then(|b| b.try_into().ok()).unwrap_or([0; N])
 }
 
 fn scalar<O: Order>(kind: Scalar, row: &[u8], offset: usize) -> f64 {
@@ -172,7 +179,11 @@ fn index<O: Order>(kind: Scalar, row: &[u8], offset: usize) -> u32 {
 }
 
 /// Reads all elements.
-pub(super) fn read_body<O: Order, R: Read + Send>(header: &Header, stream: &mut Stream<R>, builder: &mut Builder) -> Result<(), MeshError> {
+pub(super) fn read_body<O: Order, R: Read + Send>(
+    header: &Header,
+    stream: &mut Stream<R>,
+    builder: &mut Builder,
+) -> Result<(), MeshError> {
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_vertices::<O, R>(element, stream, builder)?,
@@ -183,7 +194,11 @@ pub(super) fn read_body<O: Order, R: Read + Send>(header: &Header, stream: &mut 
     Ok(())
 }
 
-fn read_vertices<O: Order, R: Read + Send>(element: &Element, stream: &mut Stream<R>, builder: &mut Builder) -> Result<(), MeshError> {
+fn read_vertices<O: Order, R: Read + Send>(
+    element: &Element,
+    stream: &mut Stream<R>,
+    builder: &mut Builder,
+) -> Result<(), MeshError> {
     let layout = VertexLayout::of(element, builder.normals_unwanted)?;
     builder.reserve_vertices(&layout, element.count)?;
     let Some(stride) = element.stride() else {
@@ -248,7 +263,10 @@ fn read_vertices<O: Order, R: Read + Send>(element: &Element, stream: &mut Strea
             }
         }
         if let Some(bad) = builder.first_broken_vertex(first) {
-            return Err(MeshError::new(Place::Byte(start + ((bad - first) * stride) as u64), format!("vertex {bad} is not finite")));
+            return Err(MeshError::new(
+                Place::Byte(start + ((bad - first) * stride) as u64),
+                format!("vertex {bad} is not finite"),
+            ));
         }
         stream.begin += rows * stride;
         left -= rows as u64;
@@ -256,7 +274,11 @@ fn read_vertices<O: Order, R: Read + Send>(element: &Element, stream: &mut Strea
     Ok(())
 }
 
-fn read_faces<O: Order, R: Read + Send>(element: &Element, stream: &mut Stream<R>, builder: &mut Builder) -> Result<(), MeshError> {
+fn read_faces<O: Order, R: Read + Send>(
+    element: &Element,
+    stream: &mut Stream<R>,
+    builder: &mut Builder,
+) -> Result<(), MeshError> {
     let list = index_property(element)?;
     // No more than the file has room for: the header was checked.
     builder.mesh.triangles.reserve_exact(element.count as usize);
@@ -268,7 +290,12 @@ fn read_faces<O: Order, R: Read + Send>(element: &Element, stream: &mut Stream<R
         while face < element.count {
             stream.need(1, "face")?;
             // A run of triangles: rows of 13 bytes, each beginning with a 3.
-            let rows = stream.available().chunks_exact(13).take((element.count - face) as usize).take_while(|r| r[0] == 3).count();
+            let rows = stream
+                .available()
+                .chunks_exact(13)
+                .take((element.count - face) as usize)
+                .take_while(|r| r[0] == 3)
+                .count();
             if rows > 0 {
                 let first = builder.mesh.triangles.len();
                 let corner = |r: &[u8]| [1, 5, 9].map(|at| O::u32(bytes(r, at)));
@@ -317,7 +344,11 @@ enum Row<'a> {
 }
 
 /// Walks over all rows of an element of any layout.
-fn each_row<O: Order, R: Read + Send>(element: &Element, stream: &mut Stream<R>, mut each: impl FnMut(usize, Row<'_>)) -> Result<(), MeshError> {
+fn each_row<O: Order, R: Read + Send>(
+    element: &Element,
+    stream: &mut Stream<R>,
+    mut each: impl FnMut(usize, Row<'_>),
+) -> Result<(), MeshError> {
     for _ in 0..element.count {
         for (i, property) in element.properties.iter().enumerate() {
             match property.kind {

@@ -21,9 +21,8 @@ pub(super) struct VertexLayout {
 impl VertexLayout {
     /// Finds the known properties of the vertex element.
     pub(super) fn of(element: &Element, normals_unwanted: bool) -> Result<VertexLayout, MeshError> {
-        let find = |name: &str| {
-            element.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::One(_)))
-        };
+        let find =
+            |name: &str| element.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::One(_)));
         let three = |names: [&str; 3]| Some([find(names[0])?, find(names[1])?, find(names[2])?]);
         let two = |names: [&str; 2]| Some([find(names[0])?, find(names[1])?]);
         let position = three(["x", "y", "z"])
@@ -32,7 +31,9 @@ impl VertexLayout {
         Ok(VertexLayout {
             position,
             normal: if normals_unwanted { None } else { three(["nx", "ny", "nz"]) },
-            uv: [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]].into_iter().find_map(two),
+            uv: [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]]
+                .into_iter()
+                .find_map(two),
             color,
             color_is_srgb: color.is_some_and(|c| element.properties[c[0]].kind == Kind::One(Scalar::U8)),
         })
@@ -42,9 +43,12 @@ impl VertexLayout {
 /// The index of the face element's list of vertices.
 pub(super) fn index_property(element: &Element) -> Result<usize, MeshError> {
     let found = element.properties.iter().position(|p| {
-        (p.name == "vertex_indices" || p.name == "vertex_index") && matches!(p.kind, Kind::List { item, .. } if item.is_integer())
+        (p.name == "vertex_indices" || p.name == "vertex_index")
+            && matches!(p.kind, Kind::List { item, .. } if item.is_integer())
     });
-    found.ok_or_else(|| MeshError::new(Place::File, "the `face` element lacks an integer list `vertex_indices` (or `vertex_index`)"))
+    found.ok_or_else(|| {
+        MeshError::new(Place::File, "the `face` element lacks an integer list `vertex_indices` (or `vertex_index`)")
+    })
 }
 
 /// A mesh in the making.
@@ -130,7 +134,10 @@ impl Builder {
             && index as usize >= vertices
         {
             let index = index as i32;
-            return Err(MeshError::new(Place::File, format!("face {face} names vertex {index}, but there are {vertices} vertices")));
+            return Err(MeshError::new(
+                Place::File,
+                format!("face {face} names vertex {index}, but there are {vertices} vertices"),
+            ));
         }
         // Polygons grow the list by doubling: give back what is too much.
         self.mesh.triangles.shrink_to_fit();

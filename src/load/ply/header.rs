@@ -90,7 +90,13 @@ impl Element {
         let bytes: usize = match format {
             // A digit and what separates it; the last row's end may be missing.
             Format::Ascii => 2 * self.properties.len(),
-            _ => self.properties.iter().map(|p| match p.kind { Kind::One(s) | Kind::List { count: s, .. } => s.size() }).sum(),
+            _ => self
+                .properties
+                .iter()
+                .map(|p| match p.kind {
+                    Kind::One(s) | Kind::List { count: s, .. } => s.size(),
+                })
+                .sum(),
         };
         bytes as u64
     }
@@ -115,7 +121,11 @@ impl Header {
         loop {
             let bad = |message: String| MeshError::new(Place::Line(lines + 1), message);
             let Some(line) = stream.line(4096)? else {
-                return Err(bad(if lines == 0 { "the file is empty".into() } else { "the header has no `end_header`".into() }));
+                return Err(bad(if lines == 0 {
+                    "the file is empty".into()
+                } else {
+                    "the header has no `end_header`".into()
+                }));
             };
             let Ok(line) = std::str::from_utf8(line) else {
                 return Err(bad("the header is not text: not a PLY file?".into()));
@@ -138,7 +148,9 @@ impl Header {
                         Some("binary_big_endian") => Format::BinaryBig,
                         other => {
                             let other = other.unwrap_or("");
-                            return Err(bad(format!("unknown format `{other}`: expected ascii, binary_little_endian or binary_big_endian")));
+                            return Err(bad(format!(
+                                "unknown format `{other}`: expected ascii, binary_little_endian or binary_big_endian"
+                            )));
                         }
                     });
                 }
@@ -163,7 +175,12 @@ impl Header {
                     lines += 1;
                     break;
                 }
-                other => return Err(bad(format!("unknown keyword `{}` in the header", other.chars().take(40).collect::<String>()))),
+                other => {
+                    return Err(bad(format!(
+                        "unknown keyword `{}` in the header",
+                        other.chars().take(40).collect::<String>()
+                    )));
+                }
             }
             lines += 1;
             if lines > MAX_LINES {
@@ -186,7 +203,10 @@ impl Header {
             if needed > body.saturating_add(1) || (e.count > 0 && e.properties.is_empty()) {
                 return Err(MeshError::new(
                     Place::File,
-                    format!("truncated: {} rows of `{}` do not fit into the {body} bytes after the header", e.count, e.name),
+                    format!(
+                        "truncated: {} rows of `{}` do not fit into the {body} bytes after the header",
+                        e.count, e.name
+                    ),
                 ));
             }
         }
