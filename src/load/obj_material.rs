@@ -104,9 +104,9 @@ fn color(text: &str) -> Result<Rgb, String> {
         return Err("spectral and XYZ colours are not supported".into());
     }
     let words: Vec<f32> = text.split_ascii_whitespace().map(number).collect::<Result<_, _>>()?;
-    match words.as_slice() {
-        &[v] => Ok(Rgb::grey(v)),
-        &[r, g, b, ..] => Ok(Rgb::new(r, g, b)),
+    match *words.as_slice() {
+        [v] => Ok(Rgb::grey(v)),
+        [r, g, b, ..] => Ok(Rgb::new(r, g, b)),
         _ => Err("a colour has one or three numbers".into()),
     }
 }
