@@ -119,6 +119,3 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<(SceneDesc, Diag
         _ => Err(LoadFailure { diagnostics, io }),
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -104,9 +104,9 @@ fn color(text: &str) -> Result<Rgb, String> {
         return Err("spectral and XYZ colours are not supported".into());
     }
     let words: Vec<f32> = text.split_ascii_whitespace().map(number).collect::<Result<_, _>>()?;
-    match words.as_slice() {
-        &[v] => Ok(Rgb::grey(v)),
-        &[r, g, b, ..] => Ok(Rgb::new(r, g, b)),
+    match *words.as_slice() {
+        [v] => Ok(Rgb::grey(v)),
+        [r, g, b, ..] => Ok(Rgb::new(r, g, b)),
         _ => Err("a colour has one or three numbers".into()),
     }
 }
@@ -174,7 +174,11 @@ mod tests {
     #[test]
     fn complains_with_the_line_and_goes_on() {
         let (all, complaints) =
+<<<<<<< HEAD
             parse("Kd 1 1 1\nnewmtl a\nKd 1 x 1\nbogus 1\nmap_Kd -s 1\nKs 0.5 0.5 0.5\n".as_bytes()).unwrap();
+=======
+            parse("Kd 1 1 1\nnewmtl a\nKd 1 x 1\nbogus 1\nmap_Kd -s\nKs 0.5 0.5 0.5\n".as_bytes()).unwrap();
+>>>>>>> 8d46cef243f1f7720414f07342c58888fb046e82
         assert_eq!(complaints.iter().map(|c| c.line).collect::<Vec<_>>(), [1, 3, 4, 5]);
         assert_eq!(all[0].specular, Some(Rgb::grey(0.5)));
     }

@@ -3,6 +3,7 @@
 use super::desc::{EmitterKind, MeshDesc, SceneDesc, ShapeDesc};
 use super::diag::{Diagnostic, Diagnostics, Span};
 use glam::DMat4;
+use rayon::prelude::*;
 
 /// Checks `scene` and adds what is wrong to `out`: no sensor, no shapes, an empty film, a crop outside the film, vertices that are not
 /// finite, indices out of range and transforms that cannot be inverted are errors; a scene without light and triangles without
@@ -85,12 +86,12 @@ fn meshes(scene: &SceneDesc, shapes: &[&ShapeDesc], out: &mut Diagnostics) {
     let span_of = |mesh: usize| shapes.iter().find(|s| s.mesh.index() == mesh).and_then(|s| s.span.clone());
     let (mut flat, mut first_flat) = (0u64, None);
     for (index, mesh) in scene.meshes.iter().enumerate() {
-        if let Some(v) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        if let Some(v) = first_broken_vertex(mesh) {
             let message = format!("`{}`: vertex {v} is not finite", mesh.name);
             out.push(Diagnostic::error("scene::bad-mesh", message).at(span_of(index)));
             continue;
         }
-        if let Some(t) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= mesh.positions.len())) {
+        if let Some(t) = first_broken_triangle(mesh) {
             let message = format!("`{}`: triangle {t} names a vertex that is not there", mesh.name);
             out.push(Diagnostic::error("scene::bad-mesh", message).at(span_of(index)));
             continue;
@@ -118,22 +119,43 @@ fn meshes(scene: &SceneDesc, shapes: &[&ShapeDesc], out: &mut Diagnostics) {
     }
 }
 
+/// Vertices or triangles that one task looks at: parallel per chunk, so that the loop over its items stays a plain one.
+const CHUNK: usize = 1 << 15;
+
+fn first_broken_vertex(mesh: &MeshDesc) -> Option<usize> {
+    let sound = mesh.positions.par_chunks(CHUNK).all(|c| c.iter().all(|p| p.is_finite()));
+    if sound { None } else { mesh.positions.iter().position(|p| !p.is_finite()) }
+}
+
+fn first_broken_triangle(mesh: &MeshDesc) -> Option<usize> {
+    let n = mesh.positions.len();
+    let largest =
+        mesh.triangles.par_chunks(CHUNK).map(|c| c.iter().fold(0, |m, t| m.max(t[0]).max(t[1]).max(t[2]))).max()?;
+    if (largest as usize) < n { None } else { mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= n)) }
+}
+
 /// How many triangles have no area, and the first of them.
 fn flat_triangles(mesh: &MeshDesc) -> (u64, usize) {
-    let (mut count, mut first) = (0, 0);
-    for (i, t) in mesh.triangles.iter().enumerate() {
+    let is_flat = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
-        // In f32: a triangle whose area rounds to zero is one that Embree cannot hit either. Subnormal products are looked at again
-        // in double precision, lest a tiny model vanish.
-        let n = (b - a).cross(c - a);
-        if n.length_squared() == 0.0 && (b - a).as_dvec3().cross((c - a).as_dvec3()).length_squared() == 0.0 {
-            if count == 0 {
-                first = i;
+        // Products that round to zero in f32 are looked at again in double precision, lest a tiny model vanish.
+        (b - a).cross(c - a).length_squared() == 0.0
+            && (b - a).as_dvec3().cross((c - a).as_dvec3()).length_squared() == 0.0
+    };
+    let in_chunk = |(index, chunk): (usize, &[[u32; 3]])| {
+        let mut found = (0u64, usize::MAX);
+        for (i, t) in chunk.iter().enumerate() {
+            if is_flat(t) {
+                found = (found.0 + 1, found.1.min(index * CHUNK + i));
             }
-            count += 1;
         }
-    }
-    (count, first)
+        found
+    };
+    mesh.triangles
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(in_chunk)
+        .reduce(|| (0, usize::MAX), |a, b| (a.0 + b.0, a.1.min(b.1)))
 }
 
 #[cfg(test)]

@@ -59,13 +59,15 @@ impl<'t> Props<'t> {
             if !OBJECT_TAGS.contains(&element.tag.as_str()) {
                 check_attributes(element, report);
             }
-            if let Some(name) = &name
-                && items.iter().any(|i| i.name.as_ref() == Some(name))
-            {
-                let d = Diagnostic::error("scene::duplicate-property", format!("`{name}` is given twice"));
-                report.borrow_mut().push(d.at(element.span_of("name")));
+            let twice = items.iter().any(|i| name.is_some() && i.name == name);
+            if twice {
+                let message = format!("`{}` is given twice", name.as_deref().unwrap_or(""));
+                report
+                    .borrow_mut()
+                    .push(Diagnostic::error("scene::duplicate-property", message).at(element.span_of("name")));
             }
-            items.push(Item { name, node: child, used: Cell::new(false) });
+            // The second of two counts as seen: one message is enough.
+            items.push(Item { name, node: child, used: Cell::new(twice) });
         }
         Some(Props { tree, report, node, plugin, items, asked: RefCell::default() })
     }
