@@ -35,14 +35,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
             Pixels::F32(_) => "linear, float",
         };
         let i = &image.image;
-        out!(
-            "  {}  {} x {} x {}, {space}, {}",
-            image.path.display(),
-            i.width,
-            i.height,
-            i.channels,
-            mib(i.bytes())
-        );
+        out!("  {}  {} x {} x {}, {space}, {}", image.path.display(), i.width, i.height, i.channels, mib(i.bytes()));
     }
     let options = PrepareOptions {
         backend: Backend::default_available(),
@@ -63,10 +56,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         mib(scene.geometry.bytes() + shading)
     );
     out!("lights      {} (every emitting triangle is one)", scene.lights.len());
-    out!(
-        "radius      {:.4}, centre {:.4} {:.4} {:.4}",
-        scene.radius, scene.centre.x, scene.centre.y, scene.centre.z
-    );
+    out!("radius      {:.4}, centre {:.4} {:.4} {:.4}", scene.radius, scene.centre.x, scene.centre.y, scene.centre.z);
     out!("features    {}", scene.features.names().join(", "));
     out!("backend     {}, tree built in {:.3} s", scene.query.describe(), scene.tree_seconds);
     Ok(())

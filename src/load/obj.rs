@@ -153,14 +153,10 @@ fn statement(file: &mut ObjFile, corners: &mut Vec<Corner>, number: u64, line: &
         "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim" | "hole" | "scrv" | "sp"
         | "end" | "con" => {}
         other => {
-<<<<<<< HEAD
-            return Err(format!("unknown statement `{}`: not an OBJ file?", other.chars().take(40).collect::<String>()));
-=======
             return Err(format!(
                 "unknown statement `{}`: not an OBJ file?",
                 other.chars().take(40).collect::<String>()
             ));
->>>>>>> 8d46cef243f1f7720414f07342c58888fb046e82
         }
     }
     Ok(())

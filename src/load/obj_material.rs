@@ -174,11 +174,7 @@ mod tests {
     #[test]
     fn complains_with_the_line_and_goes_on() {
         let (all, complaints) =
-<<<<<<< HEAD
-            parse("Kd 1 1 1\nnewmtl a\nKd 1 x 1\nbogus 1\nmap_Kd -s 1\nKs 0.5 0.5 0.5\n".as_bytes()).unwrap();
-=======
             parse("Kd 1 1 1\nnewmtl a\nKd 1 x 1\nbogus 1\nmap_Kd -s\nKs 0.5 0.5 0.5\n".as_bytes()).unwrap();
->>>>>>> 8d46cef243f1f7720414f07342c58888fb046e82
         assert_eq!(complaints.iter().map(|c| c.line).collect::<Vec<_>>(), [1, 3, 4, 5]);
         assert_eq!(all[0].specular, Some(Rgb::grey(0.5)));
     }
