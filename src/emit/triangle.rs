@@ -59,7 +59,7 @@ const POWER_FLOOR: f32 = 0.01;
 /// Area over squared distance to the nearest point (the solid angle of a facing triangle) from which on a triangle is sampled by solid
 /// angle. Sampling by area leaves the variation of cos/d² over the triangle in the estimate. Its relative variance at this size was
 /// measured as 1e-4 for a facing triangle, 0.02 tilted by 45° and 0.04 by 75°: below what the BSDF and visibility leave.
-const SPHERICAL_FROM: f32 = 0.05;
+const SPHERICAL_FROM: f32 = 0.3;
 /// Below this solid angle (seen edge-on) the spherical triangle is too thin to be sampled with precision.
 const MIN_SOLID_ANGLE: f64 = 1e-6;
 

@@ -21,17 +21,17 @@ pub struct Edge {
     pub distance: f32,
 }
 
-/// A vertex on a surface.
-#[derive(Clone, Debug)]
-pub struct SurfaceVertex {
+/// A vertex on a surface, as hooks see it: what is large is borrowed from the walk, which makes it in place.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceVertex<'a> {
     /// Number of the vertex, counted from the sub-path's origin: the first hit is 1.
     pub index: u32,
     /// What was hit.
-    pub hit: Hit,
+    pub hit: &'a Hit,
     /// The point.
-    pub point: SurfacePoint,
+    pub point: &'a SurfacePoint,
     /// The BSDF there, seen from `wo`.
-    pub bsdf: Bsdf,
+    pub bsdf: &'a Bsdf,
     /// Unit direction back to the vertex before.
     pub wo: Vec3,
     /// Throughput up to this vertex: everything of the measurement contribution that the walk has passed, divided by its density.
@@ -40,7 +40,7 @@ pub struct SurfaceVertex {
     pub edge: Edge,
 }
 
-impl SurfaceVertex {
+impl SurfaceVertex<'_> {
     /// The normal that the choice of a light may use here: only where light from behind cannot contribute.
     #[inline]
     pub fn light_choice_normal(&self) -> Option<Vec3> {

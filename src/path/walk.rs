@@ -11,7 +11,7 @@ use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::prepared::PreparedScene;
 use crate::ray::{Ray, RayKind, T_MIN, Tracer, offset::offset_point};
-use crate::shade::{Bsdf, Transport};
+use crate::shade::{Bsdf, SurfacePoint, Transport};
 
 /// Where a walk begins.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +69,7 @@ pub fn walk<H: WalkHooks>(
 ) {
     let WalkStart { mut ray, mut throughput, pdf, delta, mut kind } = start;
     let mut edge = Edge { from: ray.o, from_normal: None, pdf, delta, survival: 1.0, distance: f32::INFINITY };
+    let mut bsdf = Bsdf::empty(&SurfacePoint::default());
     for index in 1..=limits.max_edges {
         let Some(hit) = tracer.closest(&ray, kind) else {
             hooks.escaped(index, ray.d, throughput, &edge);
@@ -77,15 +78,15 @@ pub fn walk<H: WalkHooks>(
         edge.distance = hit.t;
         let wo = -ray.d;
         let (point, material) = scene.surface_point(&hit);
-        let bsdf = material.resolve(&point, wo);
-        let vertex = SurfaceVertex { index, hit, point, bsdf, wo, throughput, edge };
+        material.resolve_into(&mut bsdf, &point, wo);
+        let vertex = SurfaceVertex { index, hit: &hit, point: &point, bsdf: &bsdf, wo, throughput, edge };
         if !hooks.surface(&vertex, tracer, sampler) || index == limits.max_edges {
             return;
         }
 
         let u = sampler.vertex(index, Purpose::Scatter);
-        let Some(sample) = vertex.bsdf.sample(wo, [u[0], u[1], u[2]], mode) else { return };
-        let survival = limits.survival(index, &vertex.bsdf);
+        let Some(sample) = bsdf.sample(wo, [u[0], u[1], u[2]], mode) else { return };
+        let survival = limits.survival(index, &bsdf);
         if u[3] >= survival {
             return;
         }

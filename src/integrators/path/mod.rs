@@ -145,7 +145,7 @@ impl Gather<'_> {
     fn next_event(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) {
         let u = sampler.vertex(vertex.index, Purpose::Emitter);
         let lights = &self.scene.lights;
-        let point = &vertex.point;
+        let point = vertex.point;
         let Some((id, chosen)) = lights.pick_from(point.p, vertex.light_choice_normal(), u[0]) else { return };
         let Some(light) = lights.get(id).sample_direct(point.p, [u[1], u[2]]) else { return };
         let (value, bsdf_pdf) = vertex.bsdf.eval_and_pdf(vertex.wo, light.wi, Transport::Radiance);
@@ -156,7 +156,7 @@ impl Gather<'_> {
         let weight = if light.delta {
             1.0
         } else {
-            let survival = self.tracer.limits.survival(vertex.index, &vertex.bsdf);
+            let survival = self.tracer.limits.survival(vertex.index, vertex.bsdf);
             self.tracer.heuristic.weight(density, SolidAnglePdf(bsdf_pdf.0 * survival))
         };
         let contribution = vertex.throughput * value * light.radiance * (weight / density.0);
@@ -185,7 +185,7 @@ impl WalkHooks for Gather<'_> {
     #[inline]
     fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
         let lights = &self.scene.lights;
-        if let Some(id) = self.scene.light_of(&vertex.hit)
+        if let Some(id) = self.scene.light_of(vertex.hit)
             && !self.hidden(vertex.index)
         {
             let light = lights.get(id);

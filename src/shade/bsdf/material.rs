@@ -61,14 +61,15 @@ impl Material {
     /// Looks up every texture at `point` for a walk that arrived from `wo`.
     #[inline]
     pub fn resolve(&self, point: &SurfacePoint, wo: Vec3) -> Bsdf {
-        // One local, returned once and filled by reference: it is never copied.
         let mut bsdf = Bsdf::empty(point);
-        self.fill(&mut bsdf, point, wo);
+        self.resolve_into(&mut bsdf, point, wo);
         bsdf
     }
 
+    /// [`Material::resolve`] in place, for loops: a BSDF is large, and most of it is unused most of the time.
     #[inline]
-    fn fill(&self, bsdf: &mut Bsdf, point: &SurfacePoint, wo: Vec3) {
+    pub fn resolve_into(&self, bsdf: &mut Bsdf, point: &SurfacePoint, wo: Vec3) {
+        bsdf.clear(point);
         let mut node = &self.node;
         let mut only_side = None;
         if self.features.opaque() {

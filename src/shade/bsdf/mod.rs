@@ -94,9 +94,19 @@ fn side(z: f32) -> usize {
 }
 
 impl Bsdf {
+    /// Scatters nothing at `point`.
     #[inline]
-    fn empty(point: &SurfacePoint) -> Bsdf {
+    pub fn empty(point: &SurfacePoint) -> Bsdf {
         Bsdf { ng: point.ng, frame: point.frame, leaves: ArrayVec::new(), links: ArrayVec::new(), pick_scale: [0.0; 2] }
+    }
+
+    #[inline]
+    fn clear(&mut self, point: &SurfacePoint) {
+        self.ng = point.ng;
+        self.frame = point.frame;
+        self.leaves.clear();
+        self.links.clear();
+        self.pick_scale = [0.0; 2];
     }
 
     /// A single Lambertian lobe, if it is on the viewer's side.
@@ -239,7 +249,7 @@ impl Bsdf {
         match self.lambert() {
             Some(diffuse) => {
                 let local = diffuse.sample_direction(Vec3::new(0.0, 0.0, wo.dot(self.frame.n)), u)?;
-                self.smooth_sample(wo, self.frame.to_world(local).normalize(), 1.0, mode)
+                self.smooth_sample(wo, self.frame.to_world(local), 1.0, mode)
             }
             None => self.sample_general(wo, u, mode),
         }
