@@ -24,6 +24,7 @@ pub enum Light {
 impl Light {
     /// Samples the light as seen from `from`; `None` if no light can arrive from the sample. The density is for the light alone:
     /// multiply by the probability of having chosen it.
+    #[inline]
     pub fn sample_direct(&self, from: Vec3, u: [f32; 2]) -> Option<DirectSample> {
         match self {
             Light::Triangle(l) => l.sample_direct(from, u),
@@ -36,6 +37,7 @@ impl Light {
 
     /// Density per steradian with which [`Light::sample_direct`] draws the unit direction `wi`, along which a ray from `from`
     /// meets the light after `distance` (infinite for lights at infinity). Zero for delta lights.
+    #[inline]
     pub fn pdf_direct(&self, from: Vec3, wi: Vec3, distance: f32) -> SolidAnglePdf {
         match self {
             Light::Triangle(l) => l.pdf_direct(from, wi, distance),
@@ -46,6 +48,7 @@ impl Light {
 
     /// Radiance that leaves the light in the unit direction `wo`; `b` = barycentrics (b1, b2) of the point on a triangle, unused
     /// by other kinds. Black for delta lights: no ray meets them.
+    #[inline]
     pub fn emitted(&self, b: [f32; 2], wo: Vec3) -> Rgb {
         match self {
             Light::Triangle(l) => l.emitted(b, wo),

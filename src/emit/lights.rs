@@ -121,10 +121,17 @@ impl LightSet {
         self.by_power.pmf(id.index())
     }
 
+    /// Whether [`LightSet::pick_from`] looks at the point at all.
+    #[inline]
+    pub fn choice_depends_on_place(&self) -> bool {
+        self.direct.is_some()
+    }
+
     /// Chooses a light for the point `p`: the choice for direct light. `n` is the unit geometric normal on the side where light is
     /// received; lights wholly below its horizon get no probability. `None` if light counts from both sides, or in a volume.
     ///
     /// The probability is exactly [`LightSet::pmf_from`] with the same `p` and `n`. `None` is returned only if no light has power.
+    #[inline]
     pub fn pick_from(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(LightId, Pmf)> {
         match &self.direct {
             None => self.pick(u),
@@ -133,6 +140,7 @@ impl LightSet {
     }
 
     /// Probability of [`LightSet::pick_from`] with the same `p` and `n`. They sum to one over all lights.
+    #[inline]
     pub fn pmf_from(&self, p: Vec3, n: Option<Vec3>, id: LightId) -> Pmf {
         match &self.direct {
             None => self.pmf(id),

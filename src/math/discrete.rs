@@ -72,9 +72,10 @@ impl AliasTable {
         if self.columns.is_empty() {
             return None;
         }
-        // In double precision: the product must not round up to the next column.
-        let x = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON)) * self.columns.len() as f64;
-        let i = x as usize;
+        let n = self.columns.len();
+        // In double precision, and held below the last column: the product must not round up to the next one.
+        let x = f64::from(u) * n as f64;
+        let i = (x as usize).min(n - 1);
         let column = self.columns[i];
         let chosen = if ((x - i as f64) as f32) < column.threshold { i } else { column.alias as usize };
         Some((chosen, Pmf(self.pmf[chosen])))

@@ -37,14 +37,8 @@ pub struct SurfaceVertex<'a> {
     /// Throughput up to this vertex: everything of the measurement contribution that the walk has passed, divided by its density.
     pub throughput: Rgb,
     /// How it was reached.
-    pub edge: Edge,
-}
-
-impl SurfaceVertex<'_> {
-    /// The normal that the choice of a light may use here: only where light from behind cannot contribute.
-    #[inline]
-    pub fn light_choice_normal(&self) -> Option<Vec3> {
-        let n = self.point.frame.n;
-        (!self.bsdf.transmits()).then(|| if n.dot(self.wo) < 0.0 { -n } else { n })
-    }
+    pub edge: &'a Edge,
+    /// Normal that the choice of a light may use here: none where light from behind contributes, or where the scene's choice
+    /// does not depend on the place.
+    pub light_normal: Option<Vec3>,
 }

@@ -79,7 +79,9 @@ pub fn walk<H: WalkHooks>(
         let wo = -ray.d;
         let (point, material) = scene.surface_point(&hit);
         material.resolve_into(&mut bsdf, &point, wo);
-        let vertex = SurfaceVertex { index, hit: &hit, point: &point, bsdf: &bsdf, wo, throughput, edge };
+        let light_normal = if scene.lights.choice_depends_on_place() { light_normal(&point, &bsdf, wo) } else { None };
+        let vertex =
+            SurfaceVertex { index, hit: &hit, point: &point, bsdf: &bsdf, wo, throughput, edge: &edge, light_normal };
         if !hooks.surface(&vertex, tracer, sampler) || index == limits.max_edges {
             return;
         }
@@ -96,7 +98,7 @@ pub fn walk<H: WalkHooks>(
         }
         edge = Edge {
             from: point.p,
-            from_normal: vertex.light_choice_normal(),
+            from_normal: light_normal,
             pdf: sample.pdf,
             delta: sample.delta,
             survival,
@@ -110,4 +112,10 @@ pub fn walk<H: WalkHooks>(
         };
         kind = RayKind::Bounce;
     }
+}
+
+/// See [`SurfaceVertex::light_normal`].
+fn light_normal(point: &SurfacePoint, bsdf: &Bsdf, wo: Vec3) -> Option<Vec3> {
+    let n = point.frame.n;
+    (!bsdf.transmits()).then(|| if n.dot(wo) < 0.0 { -n } else { n })
 }

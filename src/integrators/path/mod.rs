@@ -146,7 +146,7 @@ impl Gather<'_> {
         let u = sampler.vertex(vertex.index, Purpose::Emitter);
         let lights = &self.scene.lights;
         let point = vertex.point;
-        let Some((id, chosen)) = lights.pick_from(point.p, vertex.light_choice_normal(), u[0]) else { return };
+        let Some((id, chosen)) = lights.pick_from(point.p, vertex.light_normal, u[0]) else { return };
         let Some(light) = lights.get(id).sample_direct(point.p, [u[1], u[2]]) else { return };
         let (value, bsdf_pdf) = vertex.bsdf.eval_and_pdf(vertex.wo, light.wi, Transport::Radiance);
         if value.is_black() {
@@ -191,7 +191,7 @@ impl WalkHooks for Gather<'_> {
             let light = lights.get(id);
             let emitted = light.emitted([vertex.hit.u, vertex.hit.v], vertex.wo);
             if !emitted.is_black() {
-                let edge = &vertex.edge;
+                let edge = vertex.edge;
                 let weight = self.hit_weight(edge, || {
                     light.pdf_direct(edge.from, -vertex.wo, edge.distance)
                         * lights.pmf_from(edge.from, edge.from_normal, id)

@@ -6,7 +6,10 @@ impl Bsdf {
     /// True if nothing is scattered: a walk ends here and no light need be sampled.
     #[inline]
     pub fn is_black(&self) -> bool {
-        self.leaves.is_empty() || self.lambert().is_some_and(|diffuse| diffuse.reflectance.is_black())
+        match &self.lambert {
+            Some(diffuse) => diffuse.reflectance.is_black(),
+            None => self.leaves.is_empty(),
+        }
     }
 
     /// True if light from the other side than `wo`'s may contribute.

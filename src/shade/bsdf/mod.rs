@@ -85,6 +85,8 @@ pub struct Bsdf {
     links: ArrayVec<Link, MAX_LINKS>,
     /// 1 / sum of the picks of the active leaves, seen from the front and from the back.
     pick_scale: [f32; 2],
+    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited and `leaves` stay empty.
+    lambert: Option<Diffuse>,
 }
 
 /// Index into the arrays of two sides.
@@ -97,7 +99,14 @@ impl Bsdf {
     /// Scatters nothing at `point`.
     #[inline]
     pub fn empty(point: &SurfacePoint) -> Bsdf {
-        Bsdf { ng: point.ng, frame: point.frame, leaves: ArrayVec::new(), links: ArrayVec::new(), pick_scale: [0.0; 2] }
+        Bsdf {
+            ng: point.ng,
+            frame: point.frame,
+            leaves: ArrayVec::new(),
+            links: ArrayVec::new(),
+            pick_scale: [0.0; 2],
+            lambert: None,
+        }
     }
 
     #[inline]
@@ -107,15 +116,14 @@ impl Bsdf {
         self.leaves.clear();
         self.links.clear();
         self.pick_scale = [0.0; 2];
+        self.lambert = None;
     }
 
     /// A single Lambertian lobe, if it is on the viewer's side.
     #[inline]
     fn set_lambert(&mut self, reflectance: Rgb, behind: bool) {
         if !behind {
-            let lobe = Lobe::Diffuse(Diffuse { reflectance });
-            self.leaves.push(Leaf { lobe, weight: 1.0, pick: 1.0, link: ROOT, active: [true, false] });
-            self.pick_scale = [1.0, 0.0];
+            self.lambert = Some(Diffuse { reflectance });
         }
     }
 
@@ -130,15 +138,6 @@ impl Bsdf {
         for s in 0..2 {
             let sum: f32 = self.leaves.iter().filter(|l| l.active[s]).map(|l| l.pick).sum();
             self.pick_scale[s] = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-        }
-    }
-
-    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited.
-    #[inline]
-    fn lambert(&self) -> Option<&Diffuse> {
-        match self.leaves.as_slice() {
-            [Leaf { lobe: Lobe::Diffuse(diffuse), link: ROOT, .. }] => Some(diffuse),
-            _ => None,
         }
     }
 
@@ -158,7 +157,7 @@ impl Bsdf {
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once, sharing their work.
     #[inline]
     pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
-        match self.lambert() {
+        match &self.lambert {
             Some(diffuse) => {
                 let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
                 if cos_o <= 0.0 || cos_i <= 0.0 {
@@ -198,7 +197,7 @@ impl Bsdf {
     /// probability is missing from the integral). It does not depend on what the walk carries.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> SolidAnglePdf {
-        match self.lambert() {
+        match &self.lambert {
             Some(_) => {
                 let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
                 SolidAnglePdf(if cos_o > 0.0 && cos_i > 0.0 { cos_i * std::f32::consts::FRAC_1_PI } else { 0.0 })
@@ -211,7 +210,7 @@ impl Bsdf {
     /// quantity).
     #[inline]
     pub fn pdf_both(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> (SolidAnglePdf, SolidAnglePdf) {
-        match self.lambert() {
+        match &self.lambert {
             Some(_) => {
                 let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
                 let inside = if cos_o > 0.0 && cos_i > 0.0 { std::f32::consts::FRAC_1_PI } else { 0.0 };
@@ -246,7 +245,7 @@ impl Bsdf {
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] say about the direction, all lobes summed; of a delta event they are those of the event alone.
     #[inline]
     pub fn sample(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
-        match self.lambert() {
+        match &self.lambert {
             Some(diffuse) => {
                 let local = diffuse.sample_direction(Vec3::new(0.0, 0.0, wo.dot(self.frame.n)), u)?;
                 self.smooth_sample(wo, self.frame.to_world(local), 1.0, mode)
@@ -351,7 +350,7 @@ impl Bsdf {
     /// whichever side the point is reached.
     #[inline]
     pub fn albedo(&self) -> Rgb {
-        if let Some(diffuse) = self.lambert() {
+        if let Some(diffuse) = &self.lambert {
             return diffuse.reflectance;
         }
         let seen =
@@ -363,7 +362,7 @@ impl Bsdf {
     /// True if a connection to this point can carry light: some lobe is not a delta.
     #[inline]
     pub fn connectable(&self) -> bool {
-        self.leaves.iter().any(|leaf| leaf.lobe.is_smooth())
+        self.lambert.is_some() || self.leaves.iter().any(|leaf| leaf.lobe.is_smooth())
     }
 }
 
