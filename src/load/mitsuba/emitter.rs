@@ -76,7 +76,10 @@ impl Builder<'_> {
 
     fn sun_sky(&mut self, p: &Props<'_>, to_world: DMat4) -> EmitterKind {
         let legacy = p.element().legacy;
-        let given = p.vector("sun_direction").map(|d| if legacy { sun::from_y_up(d) } else { d });
+        // Mitsuba 3 means a direction in the world, 0.6 one in the light's own space.
+        let given = p
+            .vector("sun_direction")
+            .map(|d| if legacy { sun::from_y_up(d) } else { to_world.inverse().transform_vector3(d) });
         let sun_direction =
             given.and_then(DVec3::try_normalize).unwrap_or_else(|| sun::direction(&sun::when_and_where(p), legacy));
         let turbidity = p.float_or("turbidity", 3.0);

@@ -30,8 +30,9 @@ impl Builder<'_> {
         if thin && !p.has("aperture_radius") {
             p.error("scene::missing-property", "a `thinlens` needs `aperture_radius`");
         }
-        let principal_point =
-            [p.float_or("principal_point_offset_x", 0.0), p.float_or("principal_point_offset_y", 0.0)];
+        let offset = [p.float_or("principal_point_offset_x", 0.0), p.float_or("principal_point_offset_y", 0.0)];
+        // Mitsuba's thin lens reads the offset and does not use it.
+        let principal_point = if thin { [0.0; 2] } else { offset };
         let to_world = p.transform("to_world").unwrap_or(DMat4::IDENTITY);
         p.ignore(&["shutter_open", "shutter_close", "kc"]);
 
