@@ -59,7 +59,7 @@ const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\npr
 const OBJ: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nf 1 2 3\n";
 
 /// Where the mesh's file name is in the scene file.
-const MESH_PLACE: &str = "scene.xml:27:54";
+const MESH_PLACE: &str = "scene.xml:25:54";
 
 #[test]
 fn missing_scene_file() {
@@ -103,7 +103,7 @@ fn undefined_reference() {
     bad_box(
         "<ref id=\"grey\"",
         "<ref id=\"gray\"",
-        &["undefined-reference", "scene.xml:28:18", "did you mean `grey`?"],
+        &["undefined-reference", "scene.xml:26:18", "did you mean `grey`?"],
     );
 }
 
@@ -120,7 +120,7 @@ fn bad_numbers() {
         let to = format!("\"fov\" value=\"{bad}\"");
         bad_box("\"fov\" value=\"60\"", &to, &["bad-value", "scene.xml:8:34", "expected a number"]);
     }
-    bad_box("\"5, 4, 3\"", "\"5, 4\"", &["bad-value", "scene.xml:37:41"]);
+    bad_box("\"5, 4, 3\"", "\"5, 4\"", &["bad-value", "scene.xml:35:41"]);
 }
 
 #[test]
@@ -134,9 +134,9 @@ fn bad_definitions() {
 #[test]
 fn truncated_ply() {
     let ascii = &PLY[..PLY.len() - 10];
-    refused(&with_mesh("cut.ply", ascii), "scene.xml", 2, &["cut.ply", "truncated", MESH_PLACE]);
+    refused(&with_mesh("cut.ply", ascii), "scene.xml", 2, &["cut.ply", "line 14", "too short", MESH_PLACE]);
     let mut binary = PLY[..PLY.find("-1 -1").unwrap()].replace("ascii", "binary_little_endian").into_bytes();
-    binary.extend([0; 50]);
+    binary.extend([0; 30]);
     refused(&with_mesh("cut.ply", binary), "scene.xml", 2, &["cut.ply", MESH_PLACE]);
     refused(&with_mesh("cut.ply", &PLY[..40]), "scene.xml", 2, &["cut.ply", MESH_PLACE]);
 }
@@ -174,7 +174,7 @@ fn nan_vertices() {
 #[test]
 fn flat_triangles_are_left_out() {
     let sandbox = with_mesh("flat.ply", PLY.replace("3 0 2 3", "3 0 2 2"));
-    renders_with_warning(&sandbox, &["flat-triangles", "1 triangle", "flat.ply", "scene.xml:27:5"]);
+    renders_with_warning(&sandbox, &["flat-triangles", "1 triangle", "flat.ply", "scene.xml:25:5"]);
     assert!(pfm_pixels(&sandbox).iter().all(|v| v.is_finite()));
 }
 
