@@ -28,7 +28,7 @@ impl Config {
                     "integrator::unknown",
                     format!("integrator \"{}\" is not known here; rendering with \"path\"", block.name),
                 );
-                diagnostics.push(d.at(block.span.clone()));
+                diagnostics.push(d.at(block.span.clone()).label(known_integrators(&block.name)));
                 &integrators::path::SPEC
             }),
             (None, None) => &integrators::path::SPEC,
@@ -77,13 +77,18 @@ impl Config {
     }
 }
 
-fn unknown_integrator(name: &str) -> Failure {
+/// Says so, and which there are.
+pub(crate) fn unknown_integrator(name: &str) -> Failure {
+    Failure::Input(format!("unknown integrator \"{name}\"; {}", known_integrators(name)))
+}
+
+/// The one that was meant, or all there are.
+fn known_integrators(name: &str) -> String {
     let known = || integrators::REGISTRY.iter().map(|s| s.name);
-    let hint = nearest(name, known()).map_or_else(
+    nearest(name, known()).map_or_else(
         || format!("known: {}", known().collect::<Vec<_>>().join(", ")),
         |n| format!("did you mean \"{n}\"?"),
-    );
-    Failure::Input(format!("unknown integrator \"{name}\"; {hint}"))
+    )
 }
 
 fn aov(name: &str) -> Result<Aov, Failure> {

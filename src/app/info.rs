@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::cli::{InfoArgs, ListArgs};
+use super::config::unknown_integrator;
 use super::report;
 use crate::image::Pixels;
 use crate::integrators;
@@ -69,7 +70,7 @@ pub(crate) fn list(args: &ListArgs) -> Result<(), Failure> {
         }
         return Ok(());
     };
-    let spec = integrators::find(name).ok_or_else(|| Failure::Input(format!("unknown integrator \"{name}\"")))?;
+    let spec = integrators::find(name).ok_or_else(|| unknown_integrator(name))?;
     out!("{}: {}\n", spec.name, spec.about);
     for p in spec.params {
         out!("  {:16}{}\n  {:16}({})", p.name, p.about, "", p.default.describe());

@@ -11,6 +11,7 @@ use crate::render::stats::Clock;
 use crate::render::{Checkpoint, CheckpointError, Progress, RenderStats, Stop, aov, output, render};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,10 +25,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     // What is typed wrong is said before anything is loaded.
     for path in &args.output {
         OutputFormat::of(path).map_err(Failure::input)?;
-        check_folder(path)?;
     }
-    for path in args.stats.iter().chain(&args.checkpoint) {
-        check_folder(path)?;
+    for path in args.output.iter().chain(&args.stats).chain(&args.checkpoint) {
+        check_writable(path)?;
     }
     let mut phases = BTreeMap::new();
     let mut clock = Clock::default();
@@ -37,6 +37,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let already_said = diagnostics.list.len();
     let config = Config::resolve(args, &desc, &mut diagnostics)?;
     if args.print_config {
+        diagnostics.list.drain(..already_said);
+        if !args.quiet {
+            report::print(&diagnostics);
+        }
         config.print(args);
         return Ok(());
     }
@@ -87,6 +91,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         })
     });
     bar.finish_and_clear();
+    if film.iterations == 0 {
+        // Interrupted before there was anything: an earlier picture is worth more than a black one.
+        return Err(Failure::Interrupted);
+    }
     if let (Some(path), Some(identity)) = (&args.checkpoint, &identity) {
         trouble = identity.save(path, &film).err();
     }
@@ -94,15 +102,18 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let run = (args.seed, config.threads, config.spec.name);
     let mut stats = RenderStats::new(&scene, &film, &outcome, phases, textures, run);
     let mut clock = Clock::default();
-    let written = clock.time(|| pool.install(|| write_outputs(args, &config, &scene, &film, &stats)));
+    let (written, result) = clock.time(|| pool.install(|| write_outputs(args, &config, &scene, &film, &stats)));
     stats.phases.insert("output", clock.total().as_secs_f64());
     if let Some(path) = &args.stats {
         write_json(path, &stats)?;
     }
     if !args.quiet {
-        summarise(&stats, &args.output);
+        summarise(&stats, &written);
+        if args.output.is_empty() {
+            note!("no output file was asked for (-o FILE)");
+        }
     }
-    written?;
+    result?;
     if let Some(e) = trouble {
         return Err(checkpoint_failure(e));
     }
@@ -122,11 +133,23 @@ fn checkpoint_failure(e: CheckpointError) -> Failure {
     }
 }
 
-/// A folder that is not there would be found out only after hours of rendering.
-fn check_folder(path: &Path) -> Result<(), Failure> {
+/// A file that cannot be written would be found out only after hours of rendering. Nothing is changed: what is there is opened
+/// only (unless it is a pipe, whose reader would notice), and what is not there is tried out under another name.
+fn check_writable(path: &Path) -> Result<(), Failure> {
+    let refused = |e: std::io::Error| Failure::Io(format!("{}: cannot be written: {e}", path.display()));
+    if let Ok(there) = path.metadata() {
+        if !there.is_file() && !there.is_dir() {
+            return Ok(());
+        }
+        return OpenOptions::new().write(true).open(path).map(drop).map_err(refused);
+    }
     let folder =
         path.parent().filter(|p| !p.as_os_str().is_empty()).map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    if folder.is_dir() { Ok(()) } else { Err(Failure::Io(format!("{}: the folder does not exist", path.display()))) }
+    if !folder.is_dir() {
+        return Err(Failure::Io(format!("{}: the folder does not exist", path.display())));
+    }
+    let trial = folder.join(format!(".lightsieve-{}.trial", std::process::id()));
+    File::create(&trial).and_then(|_| std::fs::remove_file(&trial)).map_err(refused)
 }
 
 /// The first Ctrl-C lets the iteration end and everything be written; the second quits at once.
@@ -158,22 +181,27 @@ fn show(bar: &ProgressBar, progress: &Progress) {
     bar.set_message(format!("{} spp  {:.2} Mrays/s", progress.iterations, rate / 1e6));
 }
 
-fn write_outputs(
-    args: &RenderArgs,
+/// Writes every output; one that cannot be written does not cost the others. Returns what was written, and what went wrong first.
+fn write_outputs<'a>(
+    args: &'a RenderArgs,
     config: &Config,
     scene: &PreparedScene,
     film: &Film,
     stats: &RenderStats,
-) -> Result<(), Failure> {
+) -> (Vec<&'a Path>, Result<(), Failure>) {
+    let (mut written, mut result) = (vec![], Ok(()));
     if args.output.is_empty() {
-        return Ok(());
+        return (written, result);
     }
     let layers = if config.aovs.is_empty() { vec![] } else { aov::layers(scene, film, args.seed, &config.aovs) };
     let picture = output::picture(film, layers, metadata(args, config, stats));
     for path in &args.output {
-        write_picture(path, &picture, args.exposure).map_err(Failure::io)?;
+        match write_picture(path, &picture, args.exposure) {
+            Ok(()) => written.push(path.as_path()),
+            Err(e) => result = result.and(Err(Failure::io(e))),
+        }
     }
-    Ok(())
+    (written, result)
 }
 
 fn metadata(args: &RenderArgs, config: &Config, stats: &RenderStats) -> Vec<(String, String)> {
@@ -201,7 +229,7 @@ fn write_json(path: &Path, stats: &RenderStats) -> Result<(), Failure> {
         .map_err(|e| Failure::Io(format!("{}: {e}", path.display())))
 }
 
-fn summarise(stats: &RenderStats, outputs: &[PathBuf]) {
+fn summarise(stats: &RenderStats, written: &[&Path]) {
     note!(
         "{} samples per pixel in {:.2} s ({:.2} Mrays/s, {:.0} % of the time in ray queries, {})",
         stats.iterations,
@@ -216,10 +244,7 @@ fn summarise(stats: &RenderStats, outputs: &[PathBuf]) {
             note!("  pixel {},{} iteration {}", p.x, p.y, p.iteration);
         }
     }
-    for path in outputs {
+    for path in written {
         note!("wrote {}", path.display());
-    }
-    if outputs.is_empty() {
-        note!("no output file was asked for (-o FILE)");
     }
 }

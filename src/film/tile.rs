@@ -51,7 +51,8 @@ impl FilmTile {
 
     /// Adds one sample per pixel. A sample that is not finite is counted instead.
     pub fn commit(&mut self, samples: &SampleBuffer, iteration: u64) {
-        for (i, value) in samples.values.iter().enumerate() {
+        for (i, (&at_once, &late)) in samples.at_once.iter().zip(&samples.late).enumerate() {
+            let value = at_once + late;
             if !value.is_finite() {
                 self.non_finite += 1;
                 if self.places.len() < KEPT_PLACES {
@@ -69,21 +70,33 @@ impl FilmTile {
 }
 
 /// One sample of every pixel of a tile, collected while its shadow rays are under way.
+///
+/// When a shadow ray is answered depends on its neighbours in the packet, and with them on the tile and on a crop window. What comes
+/// at once and what comes late is therefore summed apart, each in an order of the pixel's own: the same bits in any window.
 #[derive(Clone, Debug, Default)]
 pub struct SampleBuffer {
-    values: Vec<Rgb>,
+    at_once: Vec<Rgb>,
+    late: Vec<Rgb>,
 }
 
 impl SampleBuffer {
     /// All black, for the pixels of `tile`.
     pub fn clear(&mut self, tile: &FilmTile) {
-        self.values.clear();
-        self.values.resize(tile.pixels() as usize, Rgb::BLACK);
+        for sums in [&mut self.at_once, &mut self.late] {
+            sums.clear();
+            sums.resize(tile.pixels() as usize, Rgb::BLACK);
+        }
     }
 
     /// Adds light to the sample of pixel `i`.
     #[inline]
     pub fn add(&mut self, i: u32, value: Rgb) {
-        self.values[i as usize] += value;
+        self.at_once[i as usize] += value;
+    }
+
+    /// Adds light whose shadow ray has been answered; in the order in which they were queued.
+    #[inline]
+    pub fn add_late(&mut self, i: u32, value: Rgb) {
+        self.late[i as usize] += value;
     }
 }

@@ -2,9 +2,11 @@
 //! values read through [`Image::rgb`] and [`Image::value`] are linear.
 
 use crate::math::Rgb;
+use crate::math::hash::mix64;
+use std::fmt;
 
 /// Pixel values, row by row from the top, channels interleaved.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub enum Pixels {
     /// Eight bits, sRGB transfer: decoded on reading.
     Srgb8(Vec<u8>),
@@ -12,6 +14,24 @@ pub enum Pixels {
     Linear8(Vec<u8>),
     /// Linear floats.
     F32(Vec<f32>),
+}
+
+/// How many values, and a hash of them: millions of numbers help nobody, and different pictures look different.
+impl fmt::Debug for Pixels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Eight bytes to a word.
+        let bytes = |v: &[u8]| {
+            v.chunks(8)
+                .fold(1, |h: u64, c| mix64(h.rotate_left(5) ^ c.iter().fold(0, |word, &b| word << 8 | u64::from(b))))
+        };
+        let floats = |v: &[f32]| v.iter().fold(1, |h: u64, x| mix64(h.rotate_left(5) ^ u64::from(x.to_bits())));
+        let (name, count, hash) = match self {
+            Pixels::Srgb8(v) => ("Srgb8", v.len(), bytes(v)),
+            Pixels::Linear8(v) => ("Linear8", v.len(), bytes(v)),
+            Pixels::F32(v) => ("F32", v.len(), floats(v)),
+        };
+        write!(f, "{name}({count} values, hash {hash:016x})")
+    }
 }
 
 /// A picture.

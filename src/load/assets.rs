@@ -4,7 +4,7 @@ use super::mesh::{LoadedMesh, MeshError, MeshOptions};
 use super::primitives::Primitive;
 use super::report::Report;
 use super::{obj, ply, serialized};
-use crate::image::read::{Encoding, ImageError, read_image};
+use crate::image::read::{Encoding, ImageError, ImageFault, read_image};
 use crate::image::{Image, Pixels};
 use crate::scene::diag::Diagnostic;
 use crate::scene::{ImageDesc, ImageId, MeshDesc, MeshId, SceneDesc, Span};
@@ -146,7 +146,11 @@ impl Assets {
             let image = image.unwrap_or_else(|e| {
                 let message = format!("cannot read the picture `{}`: {e}", path.display());
                 if self.strict {
-                    report.push_io(Diagnostic::error("load::image", message).at(span));
+                    let d = Diagnostic::error("load::image", message).at(span);
+                    match e.fault {
+                        ImageFault::Io(_) => report.push_io(d),
+                        _ => report.push(d),
+                    }
                 } else {
                     report.push(
                         Diagnostic::warning("load::image", message).at(span).help("magenta is shown in its place"),

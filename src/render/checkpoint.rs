@@ -3,9 +3,9 @@
 //! A file is one line of JSON (what was rendered), then the sums: for each tile in order, for each pixel, three sums and three
 //! sums of squares as little-endian doubles, then the number of non-finite samples as a 64-bit integer.
 
+use super::scene_hash::scene_hash;
 use crate::film::{Film, NonFinite};
 use crate::image::atomic_write;
-use crate::math::hash::{hash_words, mix64};
 use crate::prepared::PreparedScene;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
@@ -47,44 +47,13 @@ pub enum CheckpointError {
         reason: String,
     },
     /// A checkpoint of something else.
-    #[error("{}: the checkpoint is of another render: its {what} differs", path.display())]
+    #[error("{}: the checkpoint is of another render ({what})", path.display())]
     Other {
         /// File.
         path: PathBuf,
         /// What differs.
         what: &'static str,
     },
-}
-
-/// Hash of everything in the scene that the picture depends on and that a scene file can change silently.
-fn scene_hash(scene: &PreparedScene) -> u64 {
-    let mut h = hash_words(&[
-        scene.geometry.meshes.len() as u64,
-        scene.lights.len() as u64,
-        scene.features.names().len() as u64,
-    ]);
-    let mut add = |w: u64| h = mix64(h.rotate_left(5) ^ w);
-    for mesh in &scene.geometry.meshes {
-        for p in mesh.positions.iter() {
-            add(u64::from(p.x.to_bits()) | u64::from(p.y.to_bits()) << 32);
-            add(u64::from(p.z.to_bits()));
-        }
-        for t in &mesh.triangles {
-            add(u64::from(t[0]) | u64::from(t[1]) << 32);
-            add(u64::from(t[2]));
-        }
-    }
-    for i in &scene.geometry.instances {
-        for v in i.to_world.to_cols_array() {
-            add(u64::from(v.to_bits()));
-        }
-    }
-    for (_, light) in scene.lights.iter() {
-        add(u64::from(light.power().to_bits()));
-    }
-    // Materials and cameras have no canonical bytes; their debug form changes when they do.
-    add(hash_words(&format!("{:?}", scene.camera).bytes().map(u64::from).collect::<Vec<_>>()));
-    h
 }
 
 impl Checkpoint {
@@ -144,12 +113,12 @@ impl Checkpoint {
             return Err(format(&format!("format {} is not {FORMAT}", found.format)));
         }
         let same = [
-            ("integrator", found.integrator == self.integrator),
-            ("integrator's parameters", found.params == self.params),
-            ("seed", found.seed == self.seed),
-            ("picture size", found.film_size == self.film_size),
-            ("crop window", found.window == self.window),
-            ("scene", found.scene_hash == self.scene_hash),
+            ("another integrator", found.integrator == self.integrator),
+            ("other parameters of the integrator", found.params == self.params),
+            ("another seed", found.seed == self.seed),
+            ("another picture size", found.film_size == self.film_size),
+            ("another crop window", found.window == self.window),
+            ("another scene", found.scene_hash == self.scene_hash),
         ];
         if let Some((what, _)) = same.into_iter().find(|&(_, same)| !same) {
             return Err(CheckpointError::Other { path: path.to_owned(), what });

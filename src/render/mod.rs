@@ -4,6 +4,7 @@ pub mod aov;
 pub mod checkpoint;
 pub mod driver;
 pub mod output;
+mod scene_hash;
 pub mod stats;
 
 pub use aov::Aov;

@@ -95,7 +95,7 @@ impl PathTracer {
             let mut hooks = Gather { tracer: self, scene, pixel, samples, queue: &mut queue };
             walk(scene, start, &self.limits, Transport::Radiance, &mut tracer, &mut sampler, &mut hooks);
         }
-        queue.flush(&mut tracer, |pixel, light| samples.add(pixel, light));
+        queue.flush(&mut tracer, |pixel, light| samples.add_late(pixel, light));
         tile.commit(samples, iteration.index);
         tracer.stats
     }
@@ -166,7 +166,7 @@ impl Gather<'_> {
         }
         let segment = shadow_segment(point.p, point.error, point.ng, &light);
         let samples = &mut *self.samples;
-        self.queue.push(&segment, contribution, self.pixel, tracer, |pixel, light| samples.add(pixel, light));
+        self.queue.push(&segment, contribution, self.pixel, tracer, |pixel, light| samples.add_late(pixel, light));
     }
 }
 
