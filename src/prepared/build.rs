@@ -111,7 +111,9 @@ impl PreparedScene {
         }
 
         let (meshes, removed): (Vec<_>, Vec<_>) = placer.finish();
-        for (name, count) in removed.into_iter().filter(|&(_, n)| n > 0) {
+        // Validation names them where it can; what only its place has flattened is named here.
+        let named = diagnostics.list.iter().any(|d| d.code == "scene::flat-triangles");
+        for (name, count) in removed.into_iter().filter(|&(_, n)| n > 0 && !named) {
             let message = format!("{count} triangles of {name} have no area and were removed");
             diagnostics.push(Diagnostic::warning("mesh::degenerate", message));
         }
