@@ -224,6 +224,9 @@ fn affine(m: DMat4) -> (Affine3A, Mat3A) {
     (to_world, single(linear.inverse().transpose()))
 }
 
+/// A mesh in its place, cut into what rays and what shading need.
+type PlacedMesh = (MeshBuffers, MeshShading);
+
 /// A mesh on its way to its place.
 struct Part {
     mesh: MeshDesc,
@@ -279,13 +282,14 @@ impl Placer {
         });
     }
 
-    fn finish(self) -> (Vec<(MeshBuffers, MeshShading)>, Vec<(String, usize)>) {
+    /// Every mesh in its place, and how many triangles of which mesh had no area.
+    fn finish(self) -> (Vec<PlacedMesh>, Vec<(String, usize)>) {
         self.parts
             .into_par_iter()
             .map(|part| {
                 let name = part.mesh.name.clone();
-                let (buffers, shading, removed) = place(part);
-                ((buffers, shading), (name, removed))
+                let (placed, removed) = place(part);
+                (placed, (name, removed))
             })
             .unzip()
     }
@@ -293,7 +297,7 @@ impl Placer {
 
 /// Moves a mesh to its place, drops triangles without area, and turns triangles so that their winding agrees with the vertex
 /// normals (the side of a surface is the side of its geometric normal everywhere after this).
-fn place(part: Part) -> (MeshBuffers, MeshShading, usize) {
+fn place(part: Part) -> (PlacedMesh, usize) {
     let Part { mut mesh, to_place, flip, material, wants_tangents, wants_uvs, wants_colors } = part;
     if to_place != DMat4::IDENTITY {
         mesh.positions.par_iter_mut().for_each(|p| *p = to_place.transform_point3(p.as_dvec3()).as_vec3());
@@ -344,7 +348,7 @@ fn place(part: Part) -> (MeshBuffers, MeshShading, usize) {
         first_light: None,
         wants_tangents,
     };
-    (MeshBuffers { positions: VertexBuffer::new(mesh.positions), triangles }, shading, removed)
+    ((MeshBuffers { positions: VertexBuffer::new(mesh.positions), triangles }, shading), removed)
 }
 
 /// A texture as the emission of a surface.

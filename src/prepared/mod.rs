@@ -103,8 +103,7 @@ impl PreparedScene {
         let linear = m.matrix3;
         let absolute = Mat3A::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs()) * point.p.abs();
         let gain = (linear.x_axis.abs() + linear.y_axis.abs() + linear.z_axis.abs()).max_element();
-        let rounding =
-            crate::math::float::gamma(6) * (Vec3::from(absolute) + Vec3::from(m.translation).abs()).max_element();
+        let rounding = crate::math::float::gamma(6) * (absolute + Vec3::from(m.translation).abs()).max_element();
         point.error = 2.0 * (gain * point.error + rounding);
         point.p = m.transform_point3(point.p);
         point.ng = (*normals * point.ng).normalize();
