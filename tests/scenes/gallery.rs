@@ -1,7 +1,7 @@
 //! The gallery: small scenes that between them have every feature, each with reference values from Mitsuba 3
 //! (`pictures.py` and `reference.py` in their folder made them).
 
-use super::scenes::load;
+use lightsieve::load::{LoadOptions, load_scene};
 use lightsieve::scene::SceneDesc;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,10 @@ pub fn file(name: &str, ending: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes/gallery").join(format!("{name}.{ending}"))
 }
 
-/// A scene.
+/// A scene, which must be flawless.
 pub fn exhibit(name: &str) -> SceneDesc {
-    load(&file(name, "xml"))
+    let (scene, diagnostics) =
+        load_scene(&file(name, "xml"), &LoadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+    assert!(diagnostics.list.is_empty(), "{name}: {:?}", diagnostics.list);
+    scene
 }
