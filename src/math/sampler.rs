@@ -106,11 +106,7 @@ impl PathSampler {
     /// Numbers for vertex `vertex` (1 is the first hit).
     #[inline]
     pub fn vertex(&mut self, vertex: u32, purpose: Purpose) -> [f32; 4] {
-        if vertex <= SOBOL_VERTICES {
-            self.sobol(2 * vertex as usize + purpose as usize)
-        } else {
-            self.rng().next_4()
-        }
+        if vertex <= SOBOL_VERTICES { self.sobol(2 * vertex as usize + purpose as usize) } else { self.rng().next_4() }
     }
 
     /// Unstratified numbers for whatever has no slot.
