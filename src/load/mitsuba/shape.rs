@@ -7,9 +7,9 @@ use super::spectrum::Purpose::Emission;
 use crate::load::assets::MeshSource;
 use crate::load::mesh::MeshOptions;
 use crate::load::primitives::Primitive;
-use crate::math::Frame;
+use crate::math::{Frame, Rgb};
 use crate::scene::diag::Diagnostic;
-use crate::scene::{AreaEmission, GroupDesc, GroupId, InstanceDesc, ShapeDesc};
+use crate::scene::{AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, GroupDesc, GroupId, InstanceDesc, ShapeDesc};
 use glam::{DMat4, DVec3};
 
 const PLUGINS: [&str; 10] =
@@ -157,6 +157,12 @@ impl Builder<'_> {
             }
         }
         p.finish();
+        // As in Mitsuba 3, a light without a material reflects nothing.
+        if emission.is_some() && bsdf.is_none() {
+            let kind = BsdfKind::Diffuse { reflectance: ColorDesc::Constant(Rgb::BLACK) };
+            self.scene.bsdfs.push(BsdfDesc { name: None, kind, span: None });
+            bsdf = Some(BsdfId((self.scene.bsdfs.len() - 1) as u32));
+        }
         let mesh = self.assets.mesh(source, options, span);
         let name = p.element().attr("id").map(|a| a.value.clone());
         Some(ShapeDesc { mesh, to_world, bsdf, emission, flip_normals, name, span: Some(p.span()) })

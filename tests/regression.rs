@@ -1,0 +1,168 @@
+//! Traps that other renderers fell into (pbrt-v3 issue 229, pbrt-v4 issue 347 and others), and bugs found here: one test each.
+
+mod scenes;
+
+use lightsieve::ray::Backend;
+use scenes::{Picture, parse, prepare, takes, unbiased};
+
+/// A camera above the plane z = 0.
+fn camera(width: u32, height: u32, filter: &str) -> String {
+    format!(
+        r#"<sensor type="perspective"><float name="fov" value="60"/>
+        <transform name="to_world"><lookat origin="0, 0, 3" target="0, 0, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/>
+        <rfilter type="{filter}"/></film></sensor>"#
+    )
+}
+
+/// A big floor.
+const FLOOR: &str = r#"<shape type="rectangle"><transform name="to_world"><scale value="9"/><translate z="-1"/></transform>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></shape>"#;
+
+/// A square of side 2 at z = 0 that winds around +z and has these vertex normals.
+fn square(normal: Option<&str>) -> String {
+    let corners = ["-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0"];
+    let properties = if normal.is_some() { "property float nx\nproperty float ny\nproperty float nz\n" } else { "" };
+    let vertices: Vec<String> = corners.iter().map(|c| format!("{c} {}\n", normal.unwrap_or(""))).collect();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n{properties}\
+         element face 2\nproperty list uchar int vertex_indices\nend_header\n{}3 0 1 2\n3 0 2 3\n",
+        vertices.concat()
+    )
+}
+
+/// A square light seen from +z and −z: which side shines?
+fn shining_sides(mesh: &str, scale: [i32; 3]) -> [bool; 2] {
+    ["3", "-3"].map(|z| {
+        let [x, y, w] = scale;
+        let xml = format!(
+            r#"<sensor type="perspective"><float name="fov" value="5"/>
+            <transform name="to_world"><lookat origin="0, 0, {z}" target="0, 0, 0" up="0, 1, 0"/></transform>
+            <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/></film></sensor>
+            <shape type="ply"><string name="filename" value="square.ply"/>
+            <transform name="to_world"><scale x="{x}" y="{y}" z="{w}"/></transform>
+            <emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>"#
+        );
+        let scene = prepare(parse(&xml, &[("square.ply", mesh)]), Backend::default_available(), None);
+        let seen: Vec<bool> = unbiased()
+            .filter(|s| takes(s, &scene))
+            .map(|spec| {
+                let picture = Picture::render(spec, &scene, &[], 8, 1);
+                if picture.whole.0 > 0.5 {
+                    picture.assert_agrees(&Picture::constant(1.0, 16), 0.0, spec.name);
+                    true
+                } else {
+                    picture.assert_agrees(&Picture::constant(0.0, 16), 0.0, spec.name);
+                    false
+                }
+            })
+            .collect();
+        assert!(seen.iter().all(|&s| s == seen[0]));
+        seen[0]
+    })
+}
+
+#[test]
+fn a_mirrored_light_shines_where_its_normals_point() {
+    let (up, down, none) = (square(Some("0 0 1")), square(Some("0 0 -1")), square(None));
+    const UP: [bool; 2] = [true, false];
+    const DOWN: [bool; 2] = [false, true];
+    // As in Mitsuba 3.9.1: normals are mapped as normals; without them, the corners' winding after the map counts.
+    for (scale, front, back, wound) in [
+        ([1, 1, 1], UP, DOWN, UP),
+        ([-1, 1, 1], UP, DOWN, DOWN),
+        ([1, 1, -1], DOWN, UP, UP),
+        ([-1, -1, -1], DOWN, UP, UP),
+    ] {
+        assert_eq!(shining_sides(&up, scale), front, "{scale:?}");
+        assert_eq!(shining_sides(&down, scale), back, "{scale:?}");
+        assert_eq!(shining_sides(&none, scale), wound, "{scale:?}, without normals");
+    }
+}
+
+#[test]
+fn a_crop_window_keeps_the_brightness() {
+    let light = r#"<emitter type="point"><point name="position" x="0" y="0" z="1"/></emitter>"#;
+    let xml = camera(12, 12, "box") + FLOOR + light;
+    for crop in [[0, 0, 6, 6], [6, 6, 6, 6], [3, 5, 1, 1], [11, 0, 1, 12]] {
+        let whole = prepare(parse(&xml, &[]), Backend::default_available(), None);
+        let part = prepare(parse(&xml, &[]), Backend::default_available(), Some(crop));
+        for spec in unbiased().filter(|s| takes(s, &part)) {
+            let all = Picture::render(spec, &whole, &[], 64, 1);
+            let picture = Picture::render(spec, &part, &[], 64, 100);
+            let [x, y, width, height] = crop;
+            for (i, mean) in picture.mean.iter().enumerate() {
+                let at = (y + i as u32 / width) * 12 + x + i as u32 % width;
+                let ratio = mean[0] / all.mean[at as usize][0];
+                // Both pictures have errors of a percent or less.
+                assert!((ratio - 1.0).abs() < 0.05, "{}: {ratio} in pixel {i} of {crop:?}", spec.name);
+            }
+            assert_eq!(picture.mean.len() as u32, width * height);
+        }
+    }
+}
+
+#[test]
+fn triangles_without_area_emit_nothing() {
+    let clean = square(Some("0 0 -1"));
+    let degenerate = clean.replace("element face 2", "element face 5") + "3 0 0 1\n3 2 2 2\n3 0 1 1\n";
+    let light = r#"<shape type="ply"><string name="filename" value="square.ply"/><transform name="to_world">
+        <scale value="0.5"/><translate x="2" z="1"/></transform>
+        <emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>"#;
+    let xml = camera(8, 8, "box") + FLOOR + light;
+    let scenes = [&clean, &degenerate]
+        .map(|mesh| prepare(parse(&xml, &[("square.ply", mesh)]), Backend::default_available(), None));
+    for spec in unbiased().filter(|s| takes(s, &scenes[0])) {
+        let pictures = [0, 1].map(|i| Picture::render(spec, &scenes[i], &[], 64, 1 + 100 * i as u64));
+        assert!(pictures[0].whole.0 > 0.01);
+        pictures[0].assert_agrees(&pictures[1], 0.0, spec.name);
+    }
+}
+
+#[test]
+fn lights_without_power_are_no_lights() {
+    let dark = r#"<emitter type="point"><point name="position" x="1" y="0" z="1"/><rgb name="intensity" value="0"/></emitter>
+        <emitter type="directional"><vector name="direction" value="0, 0, -1"/><rgb name="irradiance" value="0"/></emitter>
+        <emitter type="constant"><rgb name="radiance" value="0"/></emitter>
+        <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="180"/><translate x="2" z="2"/></transform>
+            <emitter type="area"><rgb name="radiance" value="0"/></emitter></shape>"#;
+    let lamp = r#"<emitter type="point"><point name="position" x="0" y="0.5" z="1"/></emitter>"#;
+    // A lamp in a closed box reaches nobody: renders end, black.
+    let enclosed = r#"<shape type="sphere"><transform name="to_world"><scale value="0.1"/></transform>
+            <emitter type="area"><rgb name="radiance" value="9"/></emitter></shape>
+        <shape type="cube"><transform name="to_world"><scale value="0.3"/></transform></shape>"#;
+    let build =
+        |lights: &str| prepare(parse(&(camera(8, 8, "box") + FLOOR + lights), &[]), Backend::default_available(), None);
+    for (what, lights) in [("none", ""), ("dark", dark), ("enclosed", enclosed)] {
+        let scene = build(lights);
+        for spec in unbiased().filter(|s| takes(s, &scene)) {
+            let picture = Picture::render(spec, &scene, &[], 16, 1);
+            picture.assert_agrees(&Picture::constant(0.0, 64), 0.0, &format!("{}: {what}", spec.name));
+        }
+    }
+    // Beside a real light they change nothing.
+    let scenes = [build(lamp), build(&format!("{lamp}{dark}"))];
+    for spec in unbiased().filter(|s| takes(s, &scenes[1])) {
+        let pictures = [0, 1].map(|i| Picture::render(spec, &scenes[i], &[], 64, 1 + 100 * i as u64));
+        assert!(pictures[0].whole.0 > 0.01);
+        pictures[0].assert_agrees(&pictures[1], 0.0, spec.name);
+    }
+}
+
+#[test]
+fn no_sample_is_lost_at_the_border() {
+    // Odd sizes, tiles cut short, filters that reach beyond the picture: a white world is white everywhere.
+    let sky = r#"<emitter type="constant"><rgb name="radiance" value="1"/></emitter>
+        <shape type="cube"><transform name="to_world"><translate z="9"/></transform></shape>"#;
+    for (width, height) in [(1, 1), (17, 1), (1, 33), (31, 18)] {
+        for filter in ["box", "tent", "gaussian", "mitchell"] {
+            let xml = camera(width, height, filter) + sky;
+            let scene = prepare(parse(&xml, &[]), Backend::default_available(), None);
+            for spec in unbiased().filter(|s| takes(s, &scene)) {
+                let picture = Picture::render(spec, &scene, &[], 16, 1);
+                let exact = Picture::constant(1.0, (width * height) as usize);
+                picture.assert_agrees(&exact, 0.0, &format!("{}: {width} x {height}, {filter}", spec.name));
+            }
+        }
+    }
+}
