@@ -24,7 +24,7 @@ pub const RENDERS: u64 = 16;
 pub const ROUNDING: f64 = 2e-5;
 /// A sliver of light that fewer than one in a thousand samples meets may have been met by none of them, which leaves no
 /// variance to judge by: pixels that are both darker than this, relative to the picture's mean, are not compared.
-const SLIVER: f64 = 5e-3;
+const SLIVER: f64 = 1e-2;
 
 /// Reads a scene from the text of a Mitsuba file and the files that it names.
 pub fn parse(xml: &str, files: &[(&str, &str)]) -> SceneDesc {
