@@ -1,6 +1,6 @@
 //! Paths: vertices, the one random walk, and shadow rays on their way.
 //!
-//! Integrators never write a bounce loop: they give [`walk`] an origin and hooks.
+//! Integrators never write a bounce loop: they give [`walk()`] an origin and hooks.
 
 pub mod shadow;
 pub mod vertex;
