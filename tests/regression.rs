@@ -166,3 +166,24 @@ fn no_sample_is_lost_at_the_border() {
         }
     }
 }
+
+/// Random numbers of exactly zero (one in 2^23) fall on the rim of a filter whose density begins at zero.
+#[test]
+fn the_rim_of_a_pixel_filter_is_finite() {
+    use lightsieve::emit::PixelFilter;
+    use lightsieve::scene::FilterDesc;
+    let last = 1.0 - f32::EPSILON / 2.0;
+    for desc in [
+        FilterDesc::Box,
+        FilterDesc::Tent { radius: 1.0 },
+        FilterDesc::Gaussian { stddev: 0.5 },
+        FilterDesc::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 },
+    ] {
+        let filter = PixelFilter::new(desc);
+        for u in [[0.0, 0.0], [0.0, 0.5], [0.5, 0.0], [last, last], [f32::MIN_POSITIVE, last]] {
+            let (offset, weight) = filter.sample(u);
+            assert!(offset[0].is_finite() && offset[1].is_finite() && weight.is_finite(), "{desc:?} {u:?}");
+            assert!(offset[0].abs() <= filter.radius() && offset[1].abs() <= filter.radius(), "{desc:?} {u:?}");
+        }
+    }
+}

@@ -9,6 +9,10 @@ fn invert_linear(a: f64, b: f64, r: f64) -> f64 {
     if sum <= 0.0 {
         return r;
     }
+    // Where the density begins at zero, the formula below is 0/0.
+    if r <= 0.0 {
+        return 0.0;
+    }
     // The root of (b − a) s²/2 + a s = r (a + b)/2, in the form that does not cancel when a ≈ b.
     (r * sum / (a + (a * a + r * (b * b - a * a)).max(0.0).sqrt())).clamp(0.0, 1.0)
 }
