@@ -9,7 +9,7 @@ use crate::ray::{Backend, RayQuery};
 use std::collections::BTreeMap;
 
 /// Rays times triangles that the brute-force oracle may cost: beyond, it gets fewer rays.
-const BRUTE_WORK: u64 = 4_000_000_000;
+const BRUTE_WORK: u64 = 400_000_000;
 /// Share of questions that rounding may answer differently (grazing rays, vertices).
 const TOLERATED: f64 = 1e-3;
 
