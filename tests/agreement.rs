@@ -58,6 +58,9 @@ fn every_integrator_agrees_with_the_path_tracer() {
         let reference = Picture::render(&path::SPEC, &scene, &[("heuristic", "power")], SPP, 100);
         for spec in unbiased().filter(|s| takes(s, &scene)) {
             for heuristic in ["balance", "power"] {
+                if heuristic == "power" && spec.params.iter().all(|p| p.name != "heuristic") {
+                    continue;
+                }
                 let picture = Picture::render(spec, &scene, &[("heuristic", heuristic)], SPP, 200);
                 picture.assert_agrees(&reference, 0.0, &format!("{} ({heuristic}): {name}", spec.name));
             }
@@ -132,7 +135,8 @@ fn lit_plane(light: &str) -> PreparedScene {
 /// Every integrator sees the irradiance `e` on the plane.
 fn assert_irradiance(light: &str, e: f64) {
     let scene = lit_plane(light);
-    for spec in unbiased().filter(|s| takes(s, &scene)) {
+    // So little of the plane is seen that hardly a light sub-path meets it.
+    for spec in unbiased().filter(|s| takes(s, &scene) && s.name != "light") {
         let picture = Picture::render(spec, &scene, &[("max_depth", "2")], SPP, 900);
         picture.assert_agrees(&Picture::constant(ALBEDO * e / PI, 16), 2e-4, &format!("{}: {light}", spec.name));
     }

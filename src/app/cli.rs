@@ -27,6 +27,8 @@ pub(crate) enum Command {
     List(ListArgs),
     /// Compare the ray-query backends on a scene
     CheckRays(CheckRaysArgs),
+    /// Run one sample of one pixel again and print its vertices, densities, weights and contributions
+    Replay(Box<ReplayArgs>),
     /// Error metrics of an image against a reference
     Compare(CompareArgs),
 }
@@ -102,6 +104,12 @@ pub(crate) struct RenderArgs {
     /// Auxiliary layers in EXR output: albedo, normal, depth
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub aov: Vec<String>,
+    /// Also write the picture of every technique, raw and weighted, to this folder (bidirectional integrators)
+    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+    pub pyramid: Option<PathBuf>,
+    /// Longest paths of the pyramid, in edges
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u64).range(1..=32))]
+    pub pyramid_depth: u64,
     /// Save a checkpoint every minute and at the end
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
@@ -114,6 +122,39 @@ pub(crate) struct RenderArgs {
     /// Print what the command line and the scene resolve to, and stop
     #[arg(long)]
     pub print_config: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ReplayArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Column and row of the pixel in the full picture
+    #[arg(long, value_name = "X,Y", value_parser = pixel)]
+    pub pixel: [u32; 2],
+    /// Iteration, from zero
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub iteration: u64,
+    /// Integrator (see `lightsieve list`)
+    #[arg(short, long, value_name = "NAME")]
+    pub integrator: Option<String>,
+    /// Parameter of the integrator
+    #[arg(short, long, value_name = "KEY=VALUE", value_parser = pair)]
+    pub param: Vec<(String, String)>,
+    /// Seed
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Picture size instead of the scene's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// The part that was rendered, in pixels of the full picture
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
+    pub crop: Option<[u32; 4]>,
+    /// Largest number of edges of a path; short for -p max_depth=N
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub max_depth: Option<i64>,
+    /// Ray-query backend
+    #[arg(long, value_name = "BACKEND", value_enum)]
+    pub query: Option<Query>,
 }
 
 #[derive(Debug, Args)]
@@ -193,6 +234,10 @@ fn triple(text: &str) -> Result<[f64; 3], String> {
 
 fn size(text: &str) -> Result<[u32; 2], String> {
     numbers(text, 'x', "width and height, e.g. 640x360")
+}
+
+fn pixel(text: &str) -> Result<[u32; 2], String> {
+    numbers(text, ',', "column and row, e.g. 120,45")
 }
 
 fn crop(text: &str) -> Result<[u32; 4], String> {

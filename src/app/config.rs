@@ -21,7 +21,30 @@ const DEFAULT_SPP: u64 = 64;
 
 impl Config {
     pub fn resolve(args: &RenderArgs, desc: &SceneDesc, diagnostics: &mut Diagnostics) -> Result<Config, Failure> {
-        let spec = match (&args.integrator, &desc.integrator) {
+        let (spec, params) =
+            Config::of_integrator(args.integrator.as_deref(), args.max_depth, &args.param, desc, diagnostics)?;
+        let file_spp = desc.sensors.first().and_then(|s| s.sample_count).map(u64::from);
+        let iterations = match (args.spp, args.time) {
+            (Some(spp), _) => Some(spp),
+            (None, Some(_)) => None,
+            (None, None) => Some(file_spp.unwrap_or(DEFAULT_SPP).max(1)),
+        };
+        let threads = args
+            .threads
+            .map_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get), |n| n as usize);
+        let aovs = args.aov.iter().map(|name| aov(name)).collect::<Result<_, _>>()?;
+        Ok(Config { spec, params, budget: Budget { iterations, time: args.time }, threads, aovs })
+    }
+
+    /// The integrator and its parameters, from the command line or else the scene file.
+    pub fn of_integrator(
+        integrator: Option<&str>,
+        max_depth: Option<i64>,
+        given: &[(String, String)],
+        desc: &SceneDesc,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<(&'static IntegratorSpec, Params), Failure> {
+        let spec = match (integrator, &desc.integrator) {
             (Some(name), _) => integrators::find(name).ok_or_else(|| unknown_integrator(name))?,
             (None, Some(block)) => integrators::find(&block.name).unwrap_or_else(|| {
                 let d = Diagnostic::warning(
@@ -40,23 +63,13 @@ impl Config {
                 diagnostics.push(Diagnostic::warning("integrator::parameter", e.to_string()).at(span.clone()));
             }
         }
-        if let Some(depth) = args.max_depth {
+        if let Some(depth) = max_depth {
             params.set("max_depth", &depth.to_string()).map_err(Failure::input)?;
         }
-        for (key, value) in &args.param {
+        for (key, value) in given {
             params.set(key, value).map_err(Failure::input)?;
         }
-        let file_spp = desc.sensors.first().and_then(|s| s.sample_count).map(u64::from);
-        let iterations = match (args.spp, args.time) {
-            (Some(spp), _) => Some(spp),
-            (None, Some(_)) => None,
-            (None, None) => Some(file_spp.unwrap_or(DEFAULT_SPP).max(1)),
-        };
-        let threads = args
-            .threads
-            .map_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get), |n| n as usize);
-        let aovs = args.aov.iter().map(|name| aov(name)).collect::<Result<_, _>>()?;
-        Ok(Config { spec, params, budget: Budget { iterations, time: args.time }, threads, aovs })
+        Ok((spec, params))
     }
 
     /// As lines of `key = value`.

@@ -21,7 +21,9 @@ mod cli;
 mod compare;
 mod config;
 mod info;
+mod pyramid;
 mod render;
+mod replay;
 mod report;
 
 use clap::Parser;
@@ -75,6 +77,7 @@ pub fn main() -> ExitCode {
         cli::Command::Info(args) => info::run(&args),
         cli::Command::List(args) => info::list(&args),
         cli::Command::CheckRays(args) => check_rays::run(&args),
+        cli::Command::Replay(args) => replay::run(&args),
         cli::Command::Compare(args) => compare::run(&args),
     };
     match result {

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::cli::{Query, RenderArgs};
 use super::config::Config;
-use super::report;
+use super::{pyramid, report};
 use crate::film::Film;
 use crate::image::{OutputFormat, atomic_write, write_picture};
 use crate::prepared::{PrepareOptions, PreparedScene};
@@ -65,6 +65,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         return Err(Failure::Input(format!("{} cannot render this scene: {reason}", config.spec.name)));
     }
 
+    if let (Some(what), false) = ((config.spec.cannot)(scene.features), args.quiet) {
+        note!("warning: {}: {what}", config.spec.name);
+    }
+
     let params = config.params.pairs();
     let identity = (args.checkpoint.is_some() || args.resume.is_some())
         .then(|| Checkpoint::new(&scene, config.spec.name, &params, args.seed));
@@ -79,6 +83,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let mut last_checkpoint = Instant::now();
     let mut trouble = None;
     let mut integrator = (config.spec.build)(&config.params);
+    if args.pyramid.is_some() && !integrator.keep_pyramid(scene.window, args.pyramid_depth as usize) {
+        let reason =
+            format!("{} has no techniques to tell apart; --pyramid needs a bidirectional integrator", config.spec.name);
+        return Err(Failure::Input(reason));
+    }
     let outcome = pool.install(|| {
         render(&scene, &mut *integrator, &mut film, args.seed, config.budget, &interrupt, |progress, film| {
             show(&bar, progress);
@@ -102,14 +111,20 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let run = (args.seed, config.threads, config.spec.name);
     let mut stats = RenderStats::new(&scene, &film, &outcome, phases, textures, run);
     let mut clock = Clock::default();
-    let (written, result) = clock.time(|| pool.install(|| write_outputs(args, &config, &scene, &film, &stats)));
+    let (mut written, mut result) = clock.time(|| pool.install(|| write_outputs(args, &config, &scene, &film, &stats)));
+    if let (Some(folder), Some(pyramid)) = (&args.pyramid, integrator.pyramid()) {
+        match pyramid::write(folder, pyramid, &metadata(args, &config, &stats), args.exposure) {
+            Ok(files) => written.extend(files),
+            Err(e) => result = result.and(Err(e)),
+        }
+    }
     stats.phases.insert("output", clock.total().as_secs_f64());
     if let Some(path) = &args.stats {
         write_json(path, &stats)?;
     }
     if !args.quiet {
         summarise(&stats, &written);
-        if args.output.is_empty() {
+        if written.is_empty() {
             note!("no output file was asked for (-o FILE)");
         }
     }
@@ -182,13 +197,13 @@ fn show(bar: &ProgressBar, progress: &Progress) {
 }
 
 /// Writes every output; one that cannot be written does not cost the others. Returns what was written, and what went wrong first.
-fn write_outputs<'a>(
-    args: &'a RenderArgs,
+fn write_outputs(
+    args: &RenderArgs,
     config: &Config,
     scene: &PreparedScene,
     film: &Film,
     stats: &RenderStats,
-) -> (Vec<&'a Path>, Result<(), Failure>) {
+) -> (Vec<PathBuf>, Result<(), Failure>) {
     let (mut written, mut result) = (vec![], Ok(()));
     if args.output.is_empty() {
         return (written, result);
@@ -197,7 +212,7 @@ fn write_outputs<'a>(
     let picture = output::picture(film, layers, metadata(args, config, stats));
     for path in &args.output {
         match write_picture(path, &picture, args.exposure) {
-            Ok(()) => written.push(path.as_path()),
+            Ok(()) => written.push(path.clone()),
             Err(e) => result = result.and(Err(Failure::io(e))),
         }
     }
@@ -229,7 +244,7 @@ fn write_json(path: &Path, stats: &RenderStats) -> Result<(), Failure> {
         .map_err(|e| Failure::Io(format!("{}: {e}", path.display())))
 }
 
-fn summarise(stats: &RenderStats, written: &[&Path]) {
+fn summarise(stats: &RenderStats, written: &[PathBuf]) {
     note!(
         "{} samples per pixel in {:.2} s ({:.2} Mrays/s, {:.0} % of the time in ray queries, {})",
         stats.iterations,

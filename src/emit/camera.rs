@@ -56,6 +56,13 @@ pub struct LensSample {
     pub weight: f32,
 }
 
+impl LensSample {
+    /// Density per steradian with which a camera ray from the same lens point has this direction.
+    pub fn pdf_direction(&self) -> SolidAnglePdf {
+        SolidAnglePdf(self.importance * self.cos / self.pdf.0)
+    }
+}
+
 /// A camera.
 #[derive(Clone, Debug)]
 pub struct Camera {
@@ -219,6 +226,41 @@ impl Camera {
             pdf,
             weight: importance * cos / (distance * distance * pdf.0),
         })
+    }
+
+    /// Connects a point of the lens to infinity in the unit direction `direction` from the camera; `None` if that direction is not in
+    /// the picture. The weight has no distance: W_e · cos / pdf. `distance` is what lies between the clipping planes: only things on
+    /// that way, from `p_near` on, can block the view.
+    pub fn sample_lens_at_infinity(&self, direction: Vec3, u: [f32; 2]) -> Option<LensSample> {
+        let lens = self.lens_point(u);
+        let d = self.orientation.to_local(direction);
+        if d.z <= 0.0 {
+            return None;
+        }
+        let raster = self.raster(lens, d);
+        if !self.reaches_picture(raster) {
+            return None;
+        }
+        let p = self.position + self.orientation.to_world(lens);
+        let pdf = self.pdf_lens();
+        let importance = self.direction_density(d.z) * pdf.0 / d.z;
+        Some(LensSample {
+            p,
+            p_near: p + direction * (self.near / d.z),
+            wi: -direction,
+            distance: (self.far - self.near) / d.z,
+            cos: d.z,
+            raster: raster.to_array(),
+            importance,
+            pdf,
+            weight: importance * d.z / pdf.0,
+        })
+    }
+
+    /// Densities of a ray that [`Camera::sample_ray`] drew: of its lens point per unit area (1 for a pinhole) and of its direction
+    /// per steradian.
+    pub fn pdf_sampled_ray(&self, direction: Vec3) -> (AreaPdf, SolidAnglePdf) {
+        (self.pdf_lens(), SolidAnglePdf(self.direction_density(self.axis().dot(direction))))
     }
 
     /// Densities of a camera ray from the lens point `origin` in the unit direction `direction`: of the lens point per unit area

@@ -87,9 +87,46 @@ impl PixelFilter {
         self.radius
     }
 
+    /// The filter's value at a distance of `x` pixels along one axis; the integral over all distances is 1.
+    fn value(&self, x: f32) -> f32 {
+        match &self.kind {
+            Kind::Box => value(FilterDesc::Box, self.radius, x) / (2.0 * self.radius),
+            Kind::Tent => value(FilterDesc::Tent { radius: self.radius }, self.radius, x) / self.radius,
+            Kind::Tabulated(table) => (f64::from(value(table.desc, self.radius, x)) / table.integral) as f32,
+        }
+    }
+
+    /// One of the pixels whose filter reaches the raster position `at`, and the weight of a splat that goes there instead of
+    /// to all of them: along each axis a pixel is drawn in proportion to |f| at its centre's distance. `None` where no filter reaches.
+    pub fn splat(&self, at: [f32; 2], u: [f32; 2]) -> Option<([i64; 2], f32)> {
+        let (x, wx) = self.splat_axis(at[0], u[0])?;
+        let (y, wy) = self.splat_axis(at[1], u[1])?;
+        Some(([x, y], wx * wy))
+    }
+
+    fn splat_axis(&self, at: f32, u: f32) -> Option<(i64, f32)> {
+        if let Kind::Box = self.kind {
+            return Some((at.floor() as i64, 1.0));
+        }
+        let first = (at - 0.5 - self.radius).ceil() as i64;
+        let last = (at - 0.5 + self.radius).floor() as i64;
+        let at_pixel = |i: i64| self.value(at - 0.5 - i as f32);
+        let sum: f32 = (first..=last).map(|i| at_pixel(i).abs()).sum();
+        let (mut rest, mut chosen) = (u * sum, None);
+        for i in first..=last {
+            let f = at_pixel(i);
+            if f != 0.0 {
+                chosen = Some((i, sum.copysign(f)));
+                if rest < f.abs() {
+                    break;
+                }
+                rest -= f.abs();
+            }
+        }
+        chosen
+    }
+
     /// An offset from the pixel's centre, in pixels, and the weight of the sample; weights have the mean 1.
-    ///
-    /// A splat uses the same: its raster position minus a sampled offset, weighted, is the pixel that receives it.
     pub fn sample(&self, u: [f32; 2]) -> ([f32; 2], f32) {
         match &self.kind {
             Kind::Box => ([u[0] - 0.5, u[1] - 0.5], 1.0),
@@ -189,6 +226,32 @@ mod tests {
             assert!((weight / f64::from(n) - 1.0).abs() < 2e-3, "{desc:?} {}", weight / f64::from(n));
             let (got, expected) = (second / f64::from(n), f2 / f0);
             assert!((got - expected).abs() < 2e-3, "{desc:?} {got} {expected}");
+        }
+    }
+
+    /// Splats from a regular grid of positions bring every pixel the integral of its filter, 1, and no other mean position than its
+    /// centre.
+    #[test]
+    fn splats_reproduce_the_filter() {
+        for desc in ALL {
+            let filter = PixelFilter::new(desc);
+            let (n, m) = (400, 50);
+            let (mut weight, mut first, mut second, mut f2) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            for k in 0..12 * n {
+                let at = -6.0 + (k as f32 + 0.5) / n as f32;
+                for j in 0..m {
+                    let Some((pixel, w)) = filter.splat_axis(at, (j as f32 + 0.5) / m as f32) else { continue };
+                    if pixel == 0 {
+                        let (w, x) = (f64::from(w) / f64::from(n * m), f64::from(at) - 0.5);
+                        (weight, first, second) = (weight + w, first + w * x, second + w * x * x);
+                    }
+                }
+                let x = f64::from(at) - 0.5;
+                f2 += f64::from(filter.value(x as f32)) * x * x / f64::from(n);
+            }
+            assert!((weight - 1.0).abs() < 5e-3, "{desc:?} {weight}");
+            assert!(first.abs() < 5e-3, "{desc:?} {first}");
+            assert!((second - f2).abs() < 1e-2, "{desc:?} {second} {f2}");
         }
     }
 

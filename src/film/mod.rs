@@ -4,9 +4,13 @@
 //! the number of threads, and the sums are double precision. Nothing that is not finite is ever added: it is counted, and
 //! where it came from is kept.
 
+pub mod pyramid;
+pub mod splat;
 pub mod tile;
 
-pub use tile::{FilmTile, SampleBuffer};
+pub use pyramid::Pyramid;
+pub use splat::{LightImage, Splat};
+pub use tile::{FilmTile, Part, SampleBuffer};
 
 use crate::math::Rgb;
 
@@ -109,12 +113,12 @@ mod tests {
         let mut film = Film::new([5, 7, 37, 21]);
         let mut buffer = SampleBuffer::default();
         for tile in &mut film.tiles {
-            buffer.clear(tile);
+            buffer.clear(tile.pixels());
             for i in 0..tile.pixels() {
                 let (x, y) = tile.pixel(i);
-                buffer.add(i, Rgb::new(x as f32, y as f32, 1.0));
+                buffer.add(Part::AtOnce, i, Rgb::new(x as f32, y as f32, 1.0));
             }
-            tile.commit(&buffer, 0);
+            tile.commit(&buffer, None, 0);
         }
         film.iterations = 1;
         let mean = film.mean();
@@ -131,14 +135,14 @@ mod tests {
         let mut buffer = SampleBuffer::default();
         for iteration in 0..2 {
             let tile = &mut film.tiles[0];
-            buffer.clear(tile);
+            buffer.clear(tile.pixels());
             for i in 0..16 {
-                buffer.add(i, Rgb::WHITE);
+                buffer.add(Part::AtOnce, i, Rgb::WHITE);
             }
             if iteration == 1 {
-                buffer.add(6, Rgb::new(0.0, f32::NAN, 0.0));
+                buffer.add(Part::AtOnce, 6, Rgb::new(0.0, f32::NAN, 0.0));
             }
-            tile.commit(&buffer, iteration);
+            tile.commit(&buffer, None, iteration);
         }
         film.iterations = 2;
         assert_eq!(film.non_finite(), (1, vec![NonFinite { x: 2, y: 1, iteration: 1 }]));

@@ -1,6 +1,6 @@
 //! A tile of the film and the samples of one iteration on their way into it.
 
-use super::{KEPT_PLACES, NonFinite};
+use super::{KEPT_PLACES, LightImage, NonFinite};
 use crate::math::Rgb;
 
 /// Sums of a rectangle of pixels.
@@ -49,18 +49,27 @@ impl FilmTile {
         (self.x0 + i % self.width, self.y0 + i / self.width)
     }
 
-    /// Adds one sample per pixel. A sample that is not finite is counted instead.
-    pub fn commit(&mut self, samples: &SampleBuffer, iteration: u64) {
-        for (i, (&at_once, &late)) in samples.at_once.iter().zip(&samples.late).enumerate() {
-            let value = at_once + late;
+    /// Number of the pixel at a column and row of the full picture, which must be in the tile.
+    #[inline]
+    pub fn index(&self, x: u32, y: u32) -> u32 {
+        (y - self.y0) * self.width + x - self.x0
+    }
+
+    /// Adds one sample per pixel, and what the light image has for it.
+    /// A sample that is not finite is counted instead.
+    pub fn commit(&mut self, samples: &SampleBuffer, light_image: Option<&LightImage>, iteration: u64) {
+        for i in 0..self.pixels() {
+            let (x, y) = self.pixel(i);
+            let splats = light_image.map_or(Rgb::BLACK, |image| image.at(x, y));
+            let value = samples.parts.iter().fold(splats, |sum, part| sum + part[i as usize]);
             if !value.is_finite() {
                 self.non_finite += 1;
                 if self.places.len() < KEPT_PLACES {
-                    let (x, y) = self.pixel(i as u32);
                     self.places.push(NonFinite { x, y, iteration });
                 }
                 continue;
             }
+            let i = i as usize;
             for (c, v) in value.to_array().into_iter().map(f64::from).enumerate() {
                 self.sums[i][c] += v;
                 self.squares[i][c] += v * v;
@@ -69,34 +78,39 @@ impl FilmTile {
     }
 }
 
+/// Where a contribution to a sample comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(usize)]
+pub enum Part {
+    /// Known at once: the walk met light.
+    AtOnce,
+    /// After a shadow ray of next event.
+    Direct,
+    /// After a shadow ray of a connection.
+    Connection,
+}
+
 /// One sample of every pixel of a tile, collected while its shadow rays are under way.
 ///
-/// When a shadow ray is answered depends on its neighbours in the packet, and with them on the tile and on a crop window. What comes
-/// at once and what comes late is therefore summed apart, each in an order of the pixel's own: the same bits in any window.
+/// When a shadow ray is answered depends on its neighbours in the packet, and with them on the tile and on a crop window. What
+/// waits in different queues is therefore summed apart, each part in an order of the pixel's own: the same bits in any window.
 #[derive(Clone, Debug, Default)]
 pub struct SampleBuffer {
-    at_once: Vec<Rgb>,
-    late: Vec<Rgb>,
+    parts: [Vec<Rgb>; 3],
 }
 
 impl SampleBuffer {
-    /// All black, for the pixels of `tile`.
-    pub fn clear(&mut self, tile: &FilmTile) {
-        for sums in [&mut self.at_once, &mut self.late] {
+    /// All black, for so many pixels.
+    pub fn clear(&mut self, pixels: u32) {
+        for sums in &mut self.parts {
             sums.clear();
-            sums.resize(tile.pixels() as usize, Rgb::BLACK);
+            sums.resize(pixels as usize, Rgb::BLACK);
         }
     }
 
-    /// Adds light to the sample of pixel `i`.
+    /// Adds light to the sample of pixel `i`; within a part in the order in which it was found.
     #[inline]
-    pub fn add(&mut self, i: u32, value: Rgb) {
-        self.at_once[i as usize] += value;
-    }
-
-    /// Adds light whose shadow ray has been answered; in the order in which they were queued.
-    #[inline]
-    pub fn add_late(&mut self, i: u32, value: Rgb) {
-        self.late[i as usize] += value;
+    pub fn add(&mut self, part: Part, i: u32, value: Rgb) {
+        self.parts[part as usize][i as usize] += value;
     }
 }

@@ -2,17 +2,21 @@
 //!
 //! Parameters, help texts, refusals and the tests that run over every integrator come from [`REGISTRY`], never from a second list.
 
+pub mod bdpt;
+pub mod light;
 pub mod params;
 pub mod path;
+pub mod replay;
 
 pub use params::{ParamDefault, ParamError, ParamSpec, Params};
+pub use replay::Replay;
 
-use crate::film::Film;
+use crate::film::{Film, Pyramid};
 use crate::prepared::{Features, PreparedScene};
 use crate::ray::RayStats;
 
 /// Every integrator, by name.
-pub static REGISTRY: &[&IntegratorSpec] = &[&path::SPEC];
+pub static REGISTRY: &[&IntegratorSpec] = &[&path::SPEC, &light::SPEC, &bdpt::SPEC];
 
 /// What the registry knows of an integrator.
 pub struct IntegratorSpec {
@@ -28,6 +32,8 @@ pub struct IntegratorSpec {
     pub unbiased: bool,
     /// Why it cannot render a scene with these features, if it cannot.
     pub refuses: fn(Features) -> Option<String>,
+    /// What of a scene with these features it leaves out, if it does.
+    pub cannot: fn(Features) -> Option<String>,
     /// Builds it.
     pub build: fn(&Params) -> Box<dyn Integrator>,
 }
@@ -53,4 +59,17 @@ pub trait Integrator: Send {
     /// Adds one sample per pixel to the film, in parallel on the current thread pool; the result must not depend on the
     /// number of threads.
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats;
+
+    /// Starts to keep a picture of every technique, for paths of up to `max_edges` edges; false if there are no techniques to tell apart.
+    fn keep_pyramid(&mut self, _window: [u32; 4], _max_edges: usize) -> bool {
+        false
+    }
+
+    /// What has been kept since.
+    fn pyramid(&self) -> Option<&Pyramid> {
+        None
+    }
+
+    /// Runs the sample of one pixel (column and row of the full picture) again and writes down all that happens.
+    fn replay(&mut self, iteration: &Iteration, pixel: (u32, u32)) -> Replay;
 }

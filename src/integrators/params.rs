@@ -1,5 +1,6 @@
 //! Parameters of integrators: declared once with default and meaning, set by `-p key=value` or a scene's `<integrator>` block.
 
+use crate::mis::Techniques;
 use crate::scene::diag::nearest;
 
 /// A parameter's kind and default.
@@ -11,6 +12,8 @@ pub enum ParamDefault {
     Bool(bool),
     /// One of several words.
     Choice(&'static str, &'static [&'static str]),
+    /// A list of techniques, see [`Techniques::parse`].
+    Techniques(&'static str),
 }
 
 /// Declaration of a parameter.
@@ -31,6 +34,7 @@ impl ParamDefault {
             ParamDefault::Int(d, lo, hi) => format!("whole number {lo} … {hi}, default {d}"),
             ParamDefault::Bool(d) => format!("true or false, default {d}"),
             ParamDefault::Choice(d, all) => format!("{}, default {d}", all.join(" or ")),
+            ParamDefault::Techniques(d) => format!("a list such as all,-0:*,+2:3 of light:eye vertices, default {d}"),
         }
     }
 
@@ -39,6 +43,7 @@ impl ParamDefault {
             ParamDefault::Int(d, ..) => Value::Int(d),
             ParamDefault::Bool(d) => Value::Bool(d),
             ParamDefault::Choice(d, _) => Value::Choice(d),
+            ParamDefault::Techniques(d) => Value::Techniques(d.into()),
         }
     }
 
@@ -47,15 +52,17 @@ impl ParamDefault {
             ParamDefault::Int(_, lo, hi) => text.parse().ok().filter(|v| (lo..=hi).contains(v)).map(Value::Int),
             ParamDefault::Bool(_) => text.parse().ok().map(Value::Bool),
             ParamDefault::Choice(_, all) => all.iter().find(|c| **c == text).map(|c| Value::Choice(c)),
+            ParamDefault::Techniques(_) => Techniques::parse(text).ok().map(|_| Value::Techniques(text.into())),
         }
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 enum Value {
     Int(i64),
     Bool(bool),
     Choice(&'static str),
+    Techniques(String),
 }
 
 /// A parameter that cannot be set as asked.
@@ -119,16 +126,16 @@ impl Params {
         Ok(())
     }
 
-    fn get(&self, name: &str) -> Value {
+    fn get(&self, name: &str) -> &Value {
         // Integrators ask for what they declare; anything else is a slip in the program.
         let i = self.specs.iter().position(|p| p.name == name);
-        self.values[i.unwrap_or_else(|| panic!("undeclared parameter {name}"))]
+        &self.values[i.unwrap_or_else(|| panic!("undeclared parameter {name}"))]
     }
 
     /// A whole number.
     pub fn int(&self, name: &str) -> i64 {
         match self.get(name) {
-            Value::Int(v) => v,
+            Value::Int(v) => *v,
             other => panic!("parameter {name} is {other:?}"),
         }
     }
@@ -136,7 +143,7 @@ impl Params {
     /// Yes or no.
     pub fn bool(&self, name: &str) -> bool {
         match self.get(name) {
-            Value::Bool(v) => v,
+            Value::Bool(v) => *v,
             other => panic!("parameter {name} is {other:?}"),
         }
     }
@@ -149,12 +156,22 @@ impl Params {
         }
     }
 
+    /// A set of techniques.
+    pub fn techniques(&self, name: &str) -> Techniques {
+        match self.get(name) {
+            // The text was parsed when it was set; defaults are tested.
+            Value::Techniques(v) => Techniques::parse(v).unwrap_or_else(|e| panic!("parameter {name}: {e}")),
+            other => panic!("parameter {name} is {other:?}"),
+        }
+    }
+
     /// Names and values, in the order of declaration.
     pub fn pairs(&self) -> Vec<(&'static str, String)> {
         let text = |v: &Value| match v {
             Value::Int(v) => v.to_string(),
             Value::Bool(v) => v.to_string(),
             Value::Choice(v) => (*v).to_string(),
+            Value::Techniques(v) => v.clone(),
         };
         self.specs.iter().zip(&self.values).map(|(s, v)| (s.name, text(v))).collect()
     }

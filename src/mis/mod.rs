@@ -3,6 +3,19 @@
 //! A technique i takes n_i samples of density p_i; the heuristic weighs a path found by technique i with
 //! (n_i p_i)^β / Σ_j (n_j p_j)^β (Veach 1997, §9.2; β = 1 balance, β = 2 power). Ratios only: densities along a path are
 //! never multiplied up, and squares are taken of ratios so that they do not overflow.
+//!
+//! Next event and hits of a path tracer are two techniques, weighed by [`Heuristic::weight`]. Bidirectional ones are many: each
+//! sub-path keeps its densities in a [`Side`], and a [`Weigher`] weighs a path that joins two of them.
+//! [`definition`] says the same once more, slowly and in double precision, for tests and for explaining single paths.
+
+pub mod definition;
+pub mod side;
+pub mod techniques;
+pub mod weigh;
+
+pub use side::{Node, Side, spread};
+pub use techniques::{Techniques, TechniquesError};
+pub use weigh::{Joint, Split, Weigher};
 
 use crate::math::SolidAnglePdf;
 
@@ -16,15 +29,20 @@ pub enum Heuristic {
 }
 
 impl Heuristic {
+    /// x^β.
+    #[inline]
+    pub fn power(self, x: f32) -> f32 {
+        match self {
+            Heuristic::Balance => x,
+            Heuristic::Power => x * x,
+        }
+    }
+
     /// Weight of the technique with density `this` against one with density `other`, both per steradian at the same point. A
     /// density that is zero cannot have found the path; an infinite one outweighs all others.
     #[inline]
     pub fn weight(self, this: SolidAnglePdf, other: SolidAnglePdf) -> f32 {
-        let ratio = other.0 / this.0;
-        match self {
-            Heuristic::Balance => 1.0 / (1.0 + ratio),
-            Heuristic::Power => 1.0 / (1.0 + ratio * ratio),
-        }
+        1.0 / (1.0 + self.power(other.0 / this.0))
     }
 }
 

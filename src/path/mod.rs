@@ -2,10 +2,12 @@
 //!
 //! Integrators never write a bounce loop: they give [`walk()`] an origin and hooks.
 
+pub mod full;
 pub mod shadow;
 pub mod vertex;
 pub mod walk;
 
-pub use shadow::ShadowQueue;
+pub use full::{FullPath, Interior};
+pub use shadow::{ShadowQueue, direct_segment};
 pub use vertex::{Edge, SurfaceVertex};
-pub use walk::{Limits, WalkHooks, WalkStart, walk};
+pub use walk::{Limits, WalkHooks, WalkStart, survival, walk};

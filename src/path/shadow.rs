@@ -3,33 +3,40 @@
 //! A contribution never steers the walk, so it may arrive late. Each entry knows where it goes; entries leave in the order they came,
 //! so sums do not depend on how packets were filled.
 
-use crate::math::Rgb;
+use crate::emit::{DirectSample, LightEnd};
+use crate::ray::offset::{SegmentEnd, segment};
 use crate::ray::{PACKET, RayKind, Segment, SegmentPacket, Tracer};
+use crate::shade::SurfacePoint;
 
-/// A queue of segments with what they carry.
-pub struct ShadowQueue {
-    kind: RayKind,
-    packet: SegmentPacket,
-    carried: [(u32, Rgb); PACKET],
+/// From a surface point to a sampled point of a light.
+#[inline]
+pub fn direct_segment(point: &SurfacePoint, light: &DirectSample) -> Segment {
+    let from = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
+    match light.end {
+        LightEnd::Surface { p, error, ng } => segment(&from, &SegmentEnd::Surface { p, error, ng }),
+        LightEnd::Point { p } => segment(&from, &SegmentEnd::Free(p)),
+        LightEnd::Infinite => Segment::to_infinity(from.leaving(light.wi), light.wi),
+    }
 }
 
-impl ShadowQueue {
+/// A queue of segments, each with what it carries.
+pub struct ShadowQueue<T> {
+    kind: RayKind,
+    packet: SegmentPacket,
+    carried: [T; PACKET],
+}
+
+impl<T: Copy + Default> ShadowQueue<T> {
     /// An empty queue for rays of one kind.
-    pub fn new(kind: RayKind) -> ShadowQueue {
-        ShadowQueue { kind, packet: SegmentPacket::default(), carried: [(0, Rgb::BLACK); PACKET] }
+    pub fn new(kind: RayKind) -> ShadowQueue<T> {
+        ShadowQueue { kind, packet: SegmentPacket::default(), carried: [T::default(); PACKET] }
     }
 
-    /// Queues a segment that carries `contribution` to `destination`; sends the packet off when it is full.
+    /// Queues a segment with what it carries; sends the packet off when it is full. `arrived` gets what segments carry that nothing
+    /// blocks.
     #[inline]
-    pub fn push(
-        &mut self,
-        segment: &Segment,
-        contribution: Rgb,
-        destination: u32,
-        tracer: &mut Tracer,
-        arrived: impl FnMut(u32, Rgb),
-    ) {
-        self.carried[self.packet.len] = (destination, contribution);
+    pub fn push(&mut self, segment: &Segment, carried: T, tracer: &mut Tracer, arrived: impl FnMut(T)) {
+        self.carried[self.packet.len] = carried;
         self.packet.push(segment);
         if self.packet.len == PACKET {
             self.flush(tracer, arrived);
@@ -37,14 +44,14 @@ impl ShadowQueue {
     }
 
     /// Sends off what is queued.
-    pub fn flush(&mut self, tracer: &mut Tracer, mut arrived: impl FnMut(u32, Rgb)) {
+    pub fn flush(&mut self, tracer: &mut Tracer, mut arrived: impl FnMut(T)) {
         if self.packet.len == 0 {
             return;
         }
         let blocked = tracer.occluded_packet(&self.packet, self.kind);
-        for (i, &(destination, contribution)) in self.carried[..self.packet.len].iter().enumerate() {
+        for (i, &carried) in self.carried[..self.packet.len].iter().enumerate() {
             if blocked >> i & 1 == 0 {
-                arrived(destination, contribution);
+                arrived(carried);
             }
         }
         self.packet.len = 0;

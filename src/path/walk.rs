@@ -11,7 +11,7 @@ use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::prepared::PreparedScene;
 use crate::ray::{Ray, RayKind, T_MIN, Tracer, offset::offset_point};
-use crate::shade::{Bsdf, SurfacePoint, Transport};
+use crate::shade::{Bsdf, BsdfSample, SurfacePoint, Transport};
 
 /// Where a walk begins.
 #[derive(Clone, Copy, Debug)]
@@ -40,11 +40,17 @@ pub struct Limits {
 /// Survival probability of Russian roulette never exceeds this, so that walks between white mirrors end.
 const MAX_SURVIVAL: f32 = 0.95;
 
+/// Probability to go on after a vertex with the BSDF `bsdf` where roulette is played: the same from either end of the path.
+#[inline]
+pub fn survival(bsdf: &Bsdf) -> f32 {
+    bsdf.albedo().max_component().min(MAX_SURVIVAL)
+}
+
 impl Limits {
     /// Probability to go on after vertex `index` with the BSDF `bsdf`; a function of the vertex alone.
     #[inline]
     pub fn survival(&self, index: u32, bsdf: &Bsdf) -> f32 {
-        if index < self.roulette_from { 1.0 } else { bsdf.albedo().max_component().min(MAX_SURVIVAL) }
+        if index < self.roulette_from { 1.0 } else { survival(bsdf) }
     }
 }
 
@@ -52,6 +58,10 @@ impl Limits {
 pub trait WalkHooks {
     /// A surface was met. Returns whether to go on.
     fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool;
+
+    /// The walk goes on from the vertex in a drawn direction, roulette survived.
+    #[inline]
+    fn leaving(&mut self, _vertex: &SurfaceVertex, _sample: &BsdfSample) {}
 
     /// The ray left the scene in the direction `direction`; `throughput` and `edge` as for a vertex that would be there.
     fn escaped(&mut self, index: u32, direction: Vec3, throughput: Rgb, edge: &Edge);
@@ -96,6 +106,7 @@ pub fn walk<H: WalkHooks>(
         if throughput.is_black() {
             return;
         }
+        hooks.leaving(&vertex, &sample);
         edge = Edge {
             from: point.p,
             from_normal: light_normal,
@@ -110,7 +121,10 @@ pub fn walk<H: WalkHooks>(
             t_min: T_MIN,
             t_max: f32::INFINITY,
         };
-        kind = RayKind::Bounce;
+        kind = match mode {
+            Transport::Radiance => RayKind::Bounce,
+            Transport::Importance => RayKind::LightBounce,
+        };
     }
 }
 

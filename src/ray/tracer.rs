@@ -17,11 +17,27 @@ pub enum RayKind {
     Bounce,
     /// Next-event estimation.
     ShadowDirect,
+    /// The first edge of a light sub-path.
+    Light,
+    /// The next edge of a light sub-path.
+    LightBounce,
+    /// From a light sub-path to the lens.
+    ShadowLens,
+    /// Between two sub-paths.
+    ShadowConnection,
 }
 
 impl RayKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [RayKind; 3] = [RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect];
+    pub const ALL: [RayKind; 7] = [
+        RayKind::Camera,
+        RayKind::Bounce,
+        RayKind::ShadowDirect,
+        RayKind::Light,
+        RayKind::LightBounce,
+        RayKind::ShadowLens,
+        RayKind::ShadowConnection,
+    ];
 
     /// Name in statistics.
     pub fn name(self) -> &'static str {
@@ -29,6 +45,10 @@ impl RayKind {
             RayKind::Camera => "camera",
             RayKind::Bounce => "bounce",
             RayKind::ShadowDirect => "shadow_direct",
+            RayKind::Light => "light",
+            RayKind::LightBounce => "light_bounce",
+            RayKind::ShadowLens => "shadow_lens",
+            RayKind::ShadowConnection => "shadow_connection",
         }
     }
 }

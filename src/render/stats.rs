@@ -124,7 +124,7 @@ impl RenderStats {
             wall_s: wall,
             cpu_s: outcome.cpu_seconds,
             phases,
-            rays: kinds().map(|(n, k)| (n, k.rays)).collect(),
+            rays: kinds().filter(|(_, k)| k.rays > 0).map(|(n, k)| (n, k.rays)).collect(),
             blocked: kinds().filter(|(_, k)| k.blocked > 0).map(|(n, k)| (n, k.blocked)).collect(),
             ns_per_ray: kinds()
                 .filter(|(_, k)| k.rays > 0)

@@ -43,9 +43,9 @@ pub fn prepare(desc: SceneDesc, backend: Backend, crop: Option<[u32; 4]>) -> Pre
     PreparedScene::build(desc, &options, &mut Diagnostics::default()).unwrap()
 }
 
-/// True if the integrator is made for such scenes.
+/// True if the integrator is made for such scenes, and renders all of them.
 pub fn takes(spec: &IntegratorSpec, scene: &PreparedScene) -> bool {
-    (spec.refuses)(scene.features).is_none()
+    (spec.refuses)(scene.features).is_none() && (spec.cannot)(scene.features).is_none()
 }
 
 /// Means per pixel and channel with the variances of these means.

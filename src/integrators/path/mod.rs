@@ -6,16 +6,15 @@
 //! over these two densities, so the weights of a path sum to one. Delta lights are reached by next event alone, and what follows a
 //! delta lobe by hits alone, each with weight one.
 
+use super::replay::{Contribution, Replay};
 use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params};
-use crate::emit::{DirectSample, LightEnd};
-use crate::film::{Film, FilmTile, SampleBuffer};
+use crate::film::{Film, FilmTile, Part, SampleBuffer};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Heuristic;
-use crate::path::{Edge, Limits, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
+use crate::path::{Edge, Limits, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, direct_segment, walk};
 use crate::prepared::PreparedScene;
-use crate::ray::offset::{SegmentEnd, segment};
-use crate::ray::{Ray, RayKind, RayStats, Segment, Tracer};
+use crate::ray::{Ray, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use rayon::prelude::*;
 
@@ -48,6 +47,7 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
     ],
     unbiased: true,
     refuses: |_| None,
+    cannot: |_| None,
     build: |params| Box::new(PathTracer::new(params)),
 };
 
@@ -72,32 +72,59 @@ impl PathTracer {
         }
     }
 
+    /// One sample of the pixel (x, y), which is number `hooks.pixel` of its tile.
+    fn sample(&self, iteration: &Iteration, (x, y): (u32, u32), tracer: &mut Tracer, hooks: &mut Gather) {
+        let scene = iteration.scene;
+        let index = u64::from(y) * u64::from(scene.film_size[0]) + u64::from(x);
+        let mut sampler = PathSampler::new(iteration.seed, EYE_STREAM, index, iteration.index);
+        let u = sampler.origin();
+        let (offset, weight) = scene.filter.sample([u[0], u[1]]);
+        let raster = [x as f32 + 0.5 + offset[0], y as f32 + 0.5 + offset[1]];
+        let eye = scene.camera.sample_ray(raster, [u[2], u[3]]);
+        let start = WalkStart {
+            ray: Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far },
+            throughput: Rgb::grey(weight),
+            pdf: SolidAnglePdf(1.0),
+            delta: true,
+            kind: RayKind::Camera,
+        };
+        walk(scene, start, &self.limits, Transport::Radiance, tracer, &mut sampler, hooks);
+    }
+
     fn render_tile(&self, iteration: &Iteration, tile: &mut FilmTile, samples: &mut SampleBuffer) -> RayStats {
         let scene = iteration.scene;
         let mut tracer = Tracer::new(&*scene.query);
         let mut queue = ShadowQueue::new(RayKind::ShadowDirect);
-        samples.clear(tile);
+        samples.clear(tile.pixels());
+        let mut hooks = Gather { tracer: self, scene, pixel: 0, samples, queue: &mut queue, record: None };
         for pixel in 0..tile.pixels() {
-            let (x, y) = tile.pixel(pixel);
-            let index = u64::from(y) * u64::from(scene.film_size[0]) + u64::from(x);
-            let mut sampler = PathSampler::new(iteration.seed, EYE_STREAM, index, iteration.index);
-            let u = sampler.origin();
-            let (offset, weight) = scene.filter.sample([u[0], u[1]]);
-            let raster = [x as f32 + 0.5 + offset[0], y as f32 + 0.5 + offset[1]];
-            let eye = scene.camera.sample_ray(raster, [u[2], u[3]]);
-            let start = WalkStart {
-                ray: Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far },
-                throughput: Rgb::grey(weight),
-                pdf: SolidAnglePdf(1.0),
-                delta: true,
-                kind: RayKind::Camera,
-            };
-            let mut hooks = Gather { tracer: self, scene, pixel, samples, queue: &mut queue };
-            walk(scene, start, &self.limits, Transport::Radiance, &mut tracer, &mut sampler, &mut hooks);
+            hooks.pixel = pixel;
+            self.sample(iteration, tile.pixel(pixel), &mut tracer, &mut hooks);
         }
-        queue.flush(&mut tracer, |pixel, light| samples.add_late(pixel, light));
-        tile.commit(samples, iteration.index);
+        queue.flush(&mut tracer, |c| c.arrive(samples, None));
+        tile.commit(samples, None, iteration.index);
         tracer.stats
+    }
+}
+
+/// What a shadow ray carries.
+#[derive(Clone, Copy, Default)]
+struct Carried {
+    /// Pixel of the tile.
+    pixel: u32,
+    /// Number of the contribution in a replay.
+    note: u32,
+    light: Rgb,
+}
+
+impl Carried {
+    /// Nothing was in the way.
+    #[inline]
+    fn arrive(self, samples: &mut SampleBuffer, record: Option<&mut Replay>) {
+        samples.add(Part::Direct, self.pixel, self.light);
+        if let Some(record) = record {
+            record.contributions[self.note as usize].visible = true;
+        }
     }
 }
 
@@ -115,6 +142,24 @@ impl Integrator for PathTracer {
         film.iterations += 1;
         stats
     }
+
+    fn replay(&mut self, iteration: &Iteration, pixel: (u32, u32)) -> Replay {
+        let scene = iteration.scene;
+        let (mut replay, mut samples) = (Replay { pixel, ..Replay::default() }, SampleBuffer::default());
+        samples.clear(1);
+        let (mut tracer, mut queue) = (Tracer::new(&*scene.query), ShadowQueue::new(RayKind::ShadowDirect));
+        let mut hooks = Gather {
+            tracer: self,
+            scene,
+            pixel: 0,
+            samples: &mut samples,
+            queue: &mut queue,
+            record: Some(&mut replay),
+        };
+        self.sample(iteration, pixel, &mut tracer, &mut hooks);
+        queue.flush(&mut tracer, |c| c.arrive(&mut samples, Some(&mut replay)));
+        replay
+    }
 }
 
 /// Collects light along one eye walk.
@@ -123,7 +168,8 @@ struct Gather<'a> {
     scene: &'a PreparedScene,
     pixel: u32,
     samples: &'a mut SampleBuffer,
-    queue: &'a mut ShadowQueue,
+    queue: &'a mut ShadowQueue<Carried>,
+    record: Option<&'a mut Replay>,
 }
 
 impl Gather<'_> {
@@ -159,31 +205,45 @@ impl Gather<'_> {
             let survival = self.tracer.limits.survival(vertex.index, vertex.bsdf);
             self.tracer.heuristic.weight(density, SolidAnglePdf(bsdf_pdf.0 * survival))
         };
-        let contribution = vertex.throughput * value * light.radiance * (weight / density.0);
+        let raw = vertex.throughput * value * light.radiance * (1.0 / density.0);
+        let contribution = raw * weight;
         // A black contribution needs no ray; one that is not finite goes on to the film, which reports it.
         if contribution.is_black() {
             return;
         }
-        let segment = shadow_segment(point.p, point.error, point.ng, &light);
-        let samples = &mut *self.samples;
-        self.queue.push(&segment, contribution, self.pixel, tracer, |pixel, light| samples.add_late(pixel, light));
+        let segment = direct_segment(point, &light);
+        let note = self.note((1, vertex.index as usize + 1), raw, weight, false);
+        let carried = Carried { pixel: self.pixel, note, light: contribution };
+        let (samples, record) = (&mut *self.samples, &mut self.record);
+        self.queue.push(&segment, carried, tracer, |c| c.arrive(samples, record.as_deref_mut()));
     }
-}
 
-/// From a surface point to a sampled point of a light.
-#[inline]
-fn shadow_segment(p: Vec3, error: f32, ng: Vec3, light: &DirectSample) -> Segment {
-    let from = SegmentEnd::Surface { p, error, ng };
-    match light.end {
-        LightEnd::Surface { p, error, ng } => segment(&from, &SegmentEnd::Surface { p, error, ng }),
-        LightEnd::Point { p } => segment(&from, &SegmentEnd::Free(p)),
-        LightEnd::Infinite => Segment::to_infinity(from.leaving(light.wi), light.wi),
+    /// Writes a contribution down if somebody wants to know; returns its number.
+    #[inline]
+    fn note(&mut self, technique: (usize, usize), raw: Rgb, weight: f32, visible: bool) -> u32 {
+        match &mut self.record {
+            None => 0,
+            Some(record) => {
+                let contribution = Contribution::new(technique, record.pixel, raw, weight);
+                record.contributions.push(Contribution { visible, ..contribution });
+                record.contributions.len() as u32 - 1
+            }
+        }
+    }
+
+    /// Adds what the walk met.
+    fn hit(&mut self, t: usize, raw: Rgb, weight: f32) {
+        self.note((0, t), raw, weight, true);
+        self.samples.add(Part::AtOnce, self.pixel, raw * weight);
     }
 }
 
 impl WalkHooks for Gather<'_> {
     #[inline]
     fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
+        if let Some(record) = &mut self.record {
+            record.vertex(true, vertex);
+        }
         let lights = &self.scene.lights;
         if let Some(id) = self.scene.light_of(vertex.hit)
             && !self.hidden(vertex.index)
@@ -196,7 +256,7 @@ impl WalkHooks for Gather<'_> {
                     light.pdf_direct(edge.from, -vertex.wo, edge.distance)
                         * lights.pmf_from(edge.from, edge.from_normal, id)
                 });
-                self.samples.add(self.pixel, vertex.throughput * emitted * weight);
+                self.hit(vertex.index as usize + 1, vertex.throughput * emitted, weight);
             }
         }
         if vertex.bsdf.is_black() {
@@ -221,7 +281,7 @@ impl WalkHooks for Gather<'_> {
                     light.pdf_direct(edge.from, direction, f32::INFINITY)
                         * lights.pmf_from(edge.from, edge.from_normal, id)
                 });
-                self.samples.add(self.pixel, throughput * emitted * weight);
+                self.hit(index as usize + 1, throughput * emitted, weight);
             }
         }
     }

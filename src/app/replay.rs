@@ -1,0 +1,100 @@
+//! `lightsieve replay`: one sample of one pixel, written down.
+
+use super::Failure;
+use super::cli::{Query, ReplayArgs};
+use super::config::Config;
+use super::report;
+use crate::integrators::Iteration;
+use crate::integrators::replay::{Contribution, Replay, VertexRecord};
+use crate::math::{DVec3, Rgb, Vec3};
+use crate::prepared::{PrepareOptions, PreparedScene};
+
+pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
+    let (desc, mut diagnostics) = report::load(&args.scene, true)?;
+    let config =
+        Config::of_integrator(args.integrator.as_deref(), args.max_depth, &args.param, &desc, &mut diagnostics)?;
+    let options = PrepareOptions { backend: Query::backend(args.query), threads: 1, size: args.size, crop: args.crop };
+    let prepared = PreparedScene::build(desc, &options, &mut diagnostics);
+    if diagnostics.has_errors() {
+        report::print(&diagnostics);
+    }
+    let scene = prepared.map_err(Failure::input)?;
+    let (spec, params) = config;
+    if let Some(reason) = (spec.refuses)(scene.features) {
+        return Err(Failure::Input(format!("{} cannot render this scene: {reason}", spec.name)));
+    }
+    let [x, y] = args.pixel;
+    let [x0, y0, width, height] = scene.window;
+    if x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height {
+        return Err(Failure::Input(format!("pixel {x},{y} is not in the picture ({x0},{y0},{width},{height})")));
+    }
+    let iteration = Iteration { scene: &scene, seed: args.seed, index: args.iteration };
+    let replay = (spec.build)(&params).replay(&iteration, (x, y));
+    out!("{} pixel {x},{y} iteration {} seed {}", spec.name, args.iteration, args.seed);
+    print(&replay, scene.centre);
+    Ok(())
+}
+
+fn rgb(c: Rgb) -> String {
+    format!("({:.6e} {:.6e} {:.6e})", c.r, c.g, c.b)
+}
+
+fn point(p: Vec3, centre: DVec3) -> String {
+    let p = p.as_dvec3() + centre;
+    format!("({:.6} {:.6} {:.6})", p.x, p.y, p.z)
+}
+
+fn print(replay: &Replay, centre: DVec3) {
+    for (name, letter, walk) in [("eye", 'z', &replay.eye), ("light", 'y', &replay.light)] {
+        out!("\n{name} sub-path: {} surface vertices", walk.len());
+        for (i, v) in walk.iter().enumerate() {
+            vertex(letter, i + 1, v, centre);
+        }
+    }
+    out!("\n{} contributions (light vertices s, eye vertices t)", replay.contributions.len());
+    let mut sum = Rgb::BLACK;
+    for c in &replay.contributions {
+        contribution(c, replay.pixel);
+        if c.visible && c.pixel == replay.pixel {
+            sum += c.raw * c.weight;
+        }
+    }
+    out!("\nsum of what is visible in this pixel: {}", rgb(sum));
+}
+
+fn vertex(letter: char, i: usize, v: &VertexRecord, centre: DVec3) {
+    let p = &v.interior.point;
+    out!("  {letter}{i} at {}  normal {:.4}  shading normal {:.4}", point(p.p, centre), p.ng, p.frame.n);
+    out!(
+        "     edge {:.6e} long, pdf {:.6e} /sr, survival {:.4}, cos {:.4}; throughput {}; albedo {}{}",
+        v.distance,
+        v.pdf.0,
+        v.survival,
+        p.ng.dot(v.wo),
+        rgb(v.throughput),
+        rgb(v.interior.bsdf.albedo()),
+        match v.interior.delta {
+            Some([a, b]) => format!("; left by a delta event (probabilities {:.4} and {:.4})", a.0, b.0),
+            None => String::new(),
+        }
+    );
+}
+
+fn contribution(c: &Contribution, own: (u32, u32)) {
+    out!(
+        "  ({}, {}) raw {}  weight {:.6}  contributes {}{}{}",
+        c.s,
+        c.t,
+        rgb(c.raw),
+        c.weight,
+        rgb(c.raw * c.weight),
+        if c.visible { "" } else { "  blocked" },
+        if c.pixel == own { String::new() } else { format!("  to pixel {},{}", c.pixel.0, c.pixel.1) },
+    );
+    let k = c.techniques.len().saturating_sub(1);
+    for (s, (log_share, weight)) in c.techniques.iter().enumerate() {
+        if *log_share > f64::NEG_INFINITY {
+            out!("      by definition ({s}, {}): ln n c p = {log_share:.6}, weight {weight:.9}", k + 1 - s);
+        }
+    }
+}

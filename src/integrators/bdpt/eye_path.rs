@@ -1,0 +1,273 @@
+//! Eye sub-paths: hits of lights, next event, and connections to a light sub-path.
+
+use super::light_path::{LightPath, LightVertex};
+use super::{Bidirectional, Found};
+use crate::emit::LightId;
+use crate::emit::{DirectSample, Light, LightEnd};
+use crate::integrators::replay::{Contribution, Replay};
+use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
+use crate::mis::{Joint, Node, Side, Split, spread};
+use crate::path::{Edge, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment, survival};
+use crate::prepared::PreparedScene;
+use crate::ray::Tracer;
+use crate::ray::offset::{SegmentEnd, segment};
+use crate::shade::{BsdfSample, Transport};
+
+/// Where contributions of an eye sub-path wait and go.
+pub(super) struct EyeQueues<'a> {
+    pub direct: &'a mut ShadowQueue<Found>,
+    pub connection: &'a mut ShadowQueue<Found>,
+    /// Takes what has arrived.
+    pub found: &'a mut dyn FnMut(Arrival, Found),
+}
+
+/// How a contribution was made known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Arrival {
+    Hit,
+    Direct,
+    Connection,
+}
+
+/// The hooks of an eye sub-path that is joined with `light`.
+pub(super) struct EyeHooks<'a, 'q> {
+    pub this: &'a Bidirectional,
+    pub scene: &'a PreparedScene,
+    pub light: &'a LightPath,
+    pub side: &'a mut Side,
+    pub cos_leaving: f32,
+    pub pixel: (u32, u32),
+    /// z_0.
+    pub lens: Vec3,
+    pub queues: &'a mut EyeQueues<'q>,
+    pub record: Option<&'a mut Replay>,
+}
+
+impl EyeHooks<'_, '_> {
+    /// A contribution of the technique (s, t); `origin` is its light vertex y_0 and the direction that leaves it.
+    fn found(
+        &mut self,
+        (s, t): (usize, usize),
+        origin: Option<(LightId, LightEnd, Vec3)>,
+        raw: Rgb,
+        weight: f32,
+    ) -> Found {
+        let (scene, weigher, pixel, lens) = (self.scene, &self.this.weigher, self.pixel, self.lens);
+        let note = self.record.as_mut().map_or(0, |record| {
+            // z_1 … z_{t−1}, of which the last is the light's vertex if the walk hit it.
+            let n_eye = if s == 0 { t - 2 } else { t - 1 };
+            let path = origin.map(|origin| record.path(origin, s, n_eye, lens));
+            record.found(scene, weigher, Contribution::new((s, t), pixel, raw, weight), path)
+        });
+        Found { x: pixel.0, y: pixel.1, path: 0, note, s: s as u16, t: t as u16, raw, weight }
+    }
+
+    /// (0, t): the walk met the light `id` in `direction`. The vertex on the light is the last of `side`.
+    fn hit(&mut self, id: LightId, end: LightEnd, direction: Vec3, raw: Rgb, edge: &Edge) {
+        let t = self.side.nodes().len();
+        if !self.this.weigher.techniques.uses(0, t) || (t == 2 && self.this.hide_emitters) {
+            return;
+        }
+        let lights = &self.scene.lights;
+        let light = lights.get(id);
+        let chosen = lights.pmf(id);
+        let (position, emission) = light.pdf_emission(-direction);
+        let (origin, departure) =
+            if light.is_infinite() { (AreaPdf(emission.0), SolidAnglePdf(position.0)) } else { (position, emission) };
+        let origin = origin * chosen;
+        let next_event = if t >= 3 {
+            let direct = light.pdf_direct(edge.from, direction, edge.distance)
+                * lights.pmf_from(edge.from, edge.from_normal, id);
+            // The direct density is per steradian at z_{t−2}, as the walk's own was before it was converted.
+            let walked = edge.pdf.0 * edge.survival;
+            let last = self.side.nodes()[t - 1].forward.0;
+            direct.0 * (last / walked) / origin.0
+        } else {
+            1.0
+        };
+        let split = Split {
+            light: &[],
+            light_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
+            eye: self.side.nodes(),
+            eye_joint: Joint { arrival: origin, departure },
+            next_event,
+            light_can_be_hit: true,
+        };
+        let weight = self.this.weigher.weight(&split);
+        let found = self.found((0, t), Some((id, end, -direction)), raw, weight);
+        (self.queues.found)(Arrival::Hit, found);
+    }
+
+    /// (1, t): a point of a light, drawn as seen from the eye vertex.
+    fn next_event(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) {
+        let t = vertex.index as usize + 1;
+        let u = sampler.vertex(vertex.index, Purpose::Emitter);
+        let (lights, point) = (&self.scene.lights, vertex.point);
+        let Some((id, picked)) = lights.pick_from(point.p, vertex.light_normal, u[0]) else { return };
+        let light = lights.get(id);
+        let Some(sample) = light.sample_direct(point.p, [u[1], u[2]]) else { return };
+        let (value, bsdf_pdf) = vertex.bsdf.eval_and_pdf(vertex.wo, sample.wi, Transport::Radiance);
+        if value.is_black() {
+            return;
+        }
+        let density = sample.pdf * picked;
+        let raw = vertex.throughput * value * sample.radiance * (1.0 / density.0);
+        if raw.is_black() {
+            return;
+        }
+        let weight = self.direct_weight(vertex, light, lights.pmf(id), &sample, density, bsdf_pdf);
+        let segment = direct_segment(point, &sample);
+        let found = self.found((1, t), Some((id, sample.end, -sample.wi)), raw, weight);
+        let arrived = &mut *self.queues.found;
+        self.queues.direct.push(&segment, found, tracer, |f| arrived(Arrival::Direct, f));
+    }
+
+    fn direct_weight(
+        &self,
+        vertex: &SurfaceVertex,
+        light: &Light,
+        chosen: Pmf,
+        sample: &DirectSample,
+        density: SolidAnglePdf,
+        bsdf_pdf: SolidAnglePdf,
+    ) -> f32 {
+        let t = vertex.index as usize + 1;
+        let point = vertex.point;
+        let cos = point.ng.dot(sample.wi);
+        let dist2 = sample.distance * sample.distance;
+        let (position, emission) = light.pdf_emission_given_vertex(-sample.wi);
+        // Per steradian at the eye vertex → per unit area at the light vertex.
+        let to_area = match sample.end {
+            LightEnd::Surface { ng, .. } => spread(ng.dot(sample.wi), dist2),
+            LightEnd::Point { .. } | LightEnd::Infinite => 1.0,
+        };
+        let origin = sample.end.vertex_density(position, emission) * chosen;
+        let walked = bsdf_pdf.0 * self.this.limits.survival(vertex.index, vertex.bsdf);
+        let split = Split {
+            light: &[Node::origin(origin)],
+            light_joint: Joint {
+                arrival: AreaPdf(if light.is_delta() { 0.0 } else { walked * to_area }),
+                departure: SolidAnglePdf(0.0),
+            },
+            eye: self.side.first(t),
+            eye_joint: Joint {
+                arrival: sample.end.next_density(position, emission, cos, dist2),
+                departure: vertex.bsdf.pdf(sample.wi, vertex.wo, Transport::Importance),
+            },
+            next_event: density.0 * to_area / origin.0,
+            light_can_be_hit: !light.is_delta(),
+        };
+        self.this.weigher.weight(&split)
+    }
+
+    /// (s, t) with s ≥ 2: to a vertex of the light sub-path.
+    fn connect(&mut self, vertex: &SurfaceVertex, light: &LightVertex, tracer: &mut Tracer) {
+        let t = vertex.index as usize + 1;
+        let (z, y) = (vertex.point, &light.point);
+        let offset = y.p - z.p;
+        let dist2 = offset.length_squared();
+        // Points that cannot be told apart have no direction between them.
+        if dist2 <= f32::MIN_POSITIVE {
+            return;
+        }
+        let to_light = offset * (1.0 / dist2.sqrt());
+        let (at_eye, eye_pdf) = vertex.bsdf.eval_and_pdf(vertex.wo, to_light, Transport::Radiance);
+        if at_eye.is_black() {
+            return;
+        }
+        let (at_light, light_pdf) = light.bsdf.eval_and_pdf(light.wo, -to_light, Transport::Importance);
+        let raw = vertex.throughput * at_eye * at_light * light.throughput * (1.0 / dist2);
+        if raw.is_black() {
+            return;
+        }
+        let limits = &self.this.limits;
+        let eye_pdf = eye_pdf.0 * limits.survival(vertex.index, vertex.bsdf);
+        let light_pdf = light_pdf.0 * limits.survival(light.s as u32 - 1, &light.bsdf);
+        let split = Split {
+            light: self.light.side.first(light.s),
+            light_joint: Joint {
+                arrival: AreaPdf(eye_pdf * spread(y.ng.dot(to_light), dist2)),
+                departure: light.bsdf.pdf(-to_light, light.wo, Transport::Radiance),
+            },
+            eye: self.side.first(t),
+            eye_joint: Joint {
+                arrival: AreaPdf(light_pdf * spread(z.ng.dot(to_light), dist2)),
+                departure: vertex.bsdf.pdf(to_light, vertex.wo, Transport::Importance),
+            },
+            next_event: self.light.next_event,
+            light_can_be_hit: self.light.light_can_be_hit,
+        };
+        let weight = self.this.weigher.weight(&split);
+        let segment = segment(
+            &SegmentEnd::Surface { p: z.p, error: z.error, ng: z.ng },
+            &SegmentEnd::Surface { p: y.p, error: y.error, ng: y.ng },
+        );
+        let found = self.found((light.s, t), self.light.origin, raw, weight);
+        let arrived = &mut *self.queues.found;
+        self.queues.connection.push(&segment, found, tracer, |f| arrived(Arrival::Connection, f));
+    }
+}
+
+impl WalkHooks for EyeHooks<'_, '_> {
+    fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
+        let (point, edge) = (vertex.point, vertex.edge);
+        let dist2 = edge.distance * edge.distance;
+        let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(point.ng.dot(vertex.wo), dist2);
+        self.side.arrive(forward, spread(self.cos_leaving, dist2), survival(vertex.bsdf));
+        if let Some(record) = &mut self.record {
+            record.vertex(true, vertex);
+        }
+        if let Some(id) = self.scene.light_of(vertex.hit) {
+            let light = self.scene.lights.get(id);
+            let emitted = light.emitted([vertex.hit.u, vertex.hit.v], vertex.wo);
+            if !emitted.is_black() {
+                let end = light.end_at(point.p, point.error);
+                self.hit(id, end, -vertex.wo, vertex.throughput * emitted, edge);
+            }
+        }
+        if vertex.bsdf.is_black() {
+            return false;
+        }
+        let max_edges = self.this.limits.max_edges;
+        if vertex.index < max_edges && vertex.bsdf.connectable() {
+            let t = vertex.index as usize + 1;
+            let techniques = &self.this.weigher.techniques;
+            if techniques.uses(1, t) {
+                self.next_event(vertex, tracer, sampler);
+            }
+            let light = self.light;
+            for y in &light.vertices {
+                if (y.s + t - 1) as u64 <= u64::from(max_edges) && self.this.weigher.techniques.uses(y.s, t) {
+                    self.connect(vertex, y, tracer);
+                }
+            }
+        }
+        true
+    }
+
+    fn leaving(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample) {
+        self.cos_leaving = vertex.point.ng.dot(sample.wi);
+        let reverse = if sample.delta {
+            sample.pdf_reverse_delta
+        } else {
+            vertex.bsdf.pdf(sample.wi, vertex.wo, Transport::Importance)
+        };
+        self.side.leave(reverse, sample.delta);
+        if let Some(record) = &mut self.record {
+            record.leaving(true, sample);
+        }
+    }
+
+    fn escaped(&mut self, _index: u32, direction: Vec3, throughput: Rgb, edge: &Edge) {
+        let lights = &self.scene.lights;
+        // A vertex at infinity: its density is per steradian, and only the tilt of the vertex before spreads the emission disk.
+        self.side.arrive(AreaPdf(edge.pdf.0 * edge.survival), self.cos_leaving.abs(), 1.0);
+        for &id in lights.infinite() {
+            let emitted = lights.get(id).emitted([0.0; 2], -direction);
+            if !emitted.is_black() {
+                self.hit(id, LightEnd::Infinite, direction, throughput * emitted, edge);
+            }
+        }
+    }
+}

@@ -1,0 +1,307 @@
+//! Light sub-paths: their densities, the vertices that can be connected to, and their connections to the lens.
+
+use super::{Bidirectional, Found};
+use crate::emit::{EmissionSample, LensSample, LightEnd, LightId};
+use crate::integrators::replay::{Contribution, Replay};
+use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
+use crate::mis::{Joint, Node, Side, Split, spread};
+use crate::path::{Edge, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, survival, walk};
+use crate::prepared::PreparedScene;
+use crate::ray::offset::{SegmentEnd, offset_point, segment};
+use crate::ray::{Ray, RayKind, Segment, T_MIN, Tracer};
+use crate::shade::{Bsdf, BsdfSample, SurfacePoint, Transport};
+
+/// A vertex y_{s−1} of a light sub-path, s ≥ 2, that eye vertices can be connected to.
+#[derive(Clone, Debug)]
+pub(super) struct LightVertex {
+    pub point: SurfacePoint,
+    pub bsdf: Bsdf,
+    /// Unit direction towards y_{s−2}.
+    pub wo: Vec3,
+    /// β_L: everything of the measurement contribution up to the vertex, over its density.
+    pub throughput: Rgb,
+    /// s: the vertices of the sub-path up to this one.
+    pub s: usize,
+}
+
+/// A light sub-path, with what connections to it need.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LightPath {
+    /// Densities of all its vertices.
+    pub side: Side,
+    /// Those of its vertices that can be connected to.
+    pub vertices: Vec<LightVertex>,
+    /// c_1 of paths through y_1, see `mis::weigh`.
+    pub next_event: f32,
+    /// Rays can meet the light by chance.
+    pub light_can_be_hit: bool,
+    /// The light, y_0, and the unit direction that leaves it; nothing if no light was drawn.
+    pub origin: Option<(LightId, LightEnd, Vec3)>,
+}
+
+/// Traces light sub-path number `path` of the iteration and connects its vertices to the lens. It leaves its vertices in `out`.
+pub(super) fn trace(
+    this: &Bidirectional,
+    scene: &PreparedScene,
+    sampler: &mut PathSampler,
+    tracer: &mut Tracer,
+    out: &mut LightPath,
+    lens: &mut LensQueue,
+    record: Option<&mut Replay>,
+) {
+    out.vertices.clear();
+    out.origin = None;
+    let u = sampler.origin();
+    let v = sampler.origin_direction();
+    let Some((id, chosen)) = scene.lights.pick(u[0]) else { return };
+    let light = scene.lights.get(id);
+    let Some(emission) = light.sample_emission([u[1], u[2]], [v[0], v[1]]) else { return };
+    let origin = emission.vertex_density() * chosen;
+    out.side.begin(origin);
+    out.light_can_be_hit = !light.is_delta();
+    out.origin = Some((id, emission.end, emission.direction));
+    let mut hooks = LightHooks { this, scene, id, chosen, emission: &emission, cos_leaving: 0.0, out, lens, record };
+    hooks.emitter_to_lens([v[2], v[3]], tracer, sampler);
+    let throughput = emission.flux() * (1.0 / chosen.0);
+    if throughput.is_black() || this.limits.max_edges < 2 {
+        return;
+    }
+    let start = WalkStart {
+        ray: Ray {
+            o: emission
+                .ng
+                .map_or(emission.origin, |ng| offset_point(emission.origin, emission.error, ng, emission.direction)),
+            d: emission.direction,
+            t_min: T_MIN,
+            t_max: f32::INFINITY,
+        },
+        throughput,
+        pdf: emission.pdf_direction,
+        delta: false,
+        kind: RayKind::Light,
+    };
+    // One edge of a path is left for the connection.
+    let limits = crate::path::Limits { max_edges: this.limits.max_edges - 1, ..this.limits };
+    walk(scene, start, &limits, Transport::Importance, tracer, sampler, &mut hooks);
+}
+
+/// Connections to the lens on their way.
+pub(super) struct LensQueue<'a> {
+    pub queue: &'a mut ShadowQueue<Found>,
+    pub found: &'a mut dyn FnMut(Found),
+    /// Number of the light sub-path.
+    pub path: u32,
+}
+
+struct LightHooks<'a, 'q> {
+    this: &'a Bidirectional,
+    scene: &'a PreparedScene,
+    id: LightId,
+    chosen: Pmf,
+    emission: &'a EmissionSample,
+    /// |cos| at the vertex before, between its geometric normal and the edge.
+    cos_leaving: f32,
+    out: &'a mut LightPath,
+    lens: &'a mut LensQueue<'q>,
+    record: Option<&'a mut Replay>,
+}
+
+impl LightHooks<'_, '_> {
+    /// Number of light sub-paths, by which every splat is divided.
+    fn paths(&self) -> f32 {
+        self.this.light_paths(self.scene)
+    }
+
+    /// Sends a contribution on its way to the pixel where the lens sees it.
+    fn splat(
+        &mut self,
+        s: usize,
+        lens: &LensSample,
+        segment: &Segment,
+        (raw, weight): (Rgb, f32),
+        u: [f32; 2],
+        tracer: &mut Tracer,
+    ) {
+        // The edge that leaves the light is the connection itself if there is no other.
+        let leaving = if s == 1 && self.emission.ng.is_some() { lens.wi } else { self.emission.direction };
+        let Some(([x, y], filter)) = self.scene.filter.splat(lens.raster, u) else { return };
+        let [width, height] = self.scene.film_size;
+        let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { return };
+        if x >= width || y >= height {
+            return;
+        }
+        let raw = raw * filter;
+        let (scene, weigher) = (self.scene, &self.this.weigher);
+        let origin = (self.id, self.emission.end, leaving);
+        let note = self.record.as_mut().map_or(0, |record| {
+            let path = record.path(origin, s, 0, lens.p);
+            record.found(scene, weigher, Contribution::new((s, 1), (x, y), raw, weight), Some(path))
+        });
+        let found = Found { x, y, note, path: self.lens.path, s: s as u16, t: 1, raw, weight };
+        let arrived = &mut *self.lens.found;
+        self.lens.queue.push(segment, found, tracer, arrived);
+    }
+
+    /// (s, t) = (1, 1): the light itself as the lens sees it.
+    fn emitter_to_lens(&mut self, u: [f32; 2], tracer: &mut Tracer, sampler: &mut PathSampler) {
+        if !self.this.weigher.techniques.uses(1, 1) || !self.out.light_can_be_hit || self.this.hide_emitters {
+            return;
+        }
+        let (scene, emission) = (self.scene, self.emission);
+        let sample = match emission.end {
+            LightEnd::Infinite => scene.camera.sample_lens_at_infinity(-emission.direction, u),
+            _ => scene.camera.sample_lens(emission.origin, u),
+        };
+        let Some(lens) = sample else { return };
+        let light = scene.lights.get(self.id);
+        let (emitted, cos, to_area, segment) = match emission.end {
+            LightEnd::Infinite => {
+                let to_light = -emission.direction;
+                (emission.radiance, 1.0, 1.0, Segment { o: lens.p_near, d: to_light, t_max: lens.distance })
+            }
+            end => {
+                let ng = emission.ng.unwrap_or(lens.wi);
+                let cos = ng.dot(lens.wi).max(0.0);
+                // The radiance of a textured light is the same in all directions of its front.
+                let emitted = if cos > 0.0 { emission.radiance } else { Rgb::BLACK };
+                let from = surface_end(end, emission);
+                (
+                    emitted,
+                    cos,
+                    spread(cos, lens.distance * lens.distance),
+                    segment(&from, &SegmentEnd::Free(lens.p_near)),
+                )
+            }
+        };
+        let origin = self.out.side.first(1)[0];
+        let raw = emitted * (cos * lens.weight / (origin.forward.0 * self.paths()));
+        if raw.is_black() {
+            return;
+        }
+        let direction = lens.pdf_direction();
+        let split = Split {
+            light: self.out.side.first(1),
+            light_joint: Joint { arrival: AreaPdf(direction.0 * to_area), departure: SolidAnglePdf(0.0) },
+            eye: &[Node::origin(lens.pdf)],
+            eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
+            next_event: 1.0,
+            light_can_be_hit: !light.is_delta(),
+        };
+        let weight = self.this.weigher.weight(&split);
+        let filter = sampler.rng().next_4();
+        self.splat(1, &lens, &segment, (raw, weight), [filter[0], filter[1]], tracer);
+    }
+
+    /// (s, 1): a surface vertex as the lens sees it.
+    fn vertex_to_lens(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) {
+        let s = vertex.index as usize + 1;
+        let u = sampler.vertex(vertex.index, Purpose::Emitter);
+        let point = vertex.point;
+        let Some(lens) = self.scene.camera.sample_lens(point.p, [u[0], u[1]]) else { return };
+        let value = vertex.bsdf.eval(vertex.wo, lens.wi, Transport::Importance);
+        let raw = vertex.throughput * value * (lens.weight / self.paths());
+        if raw.is_black() {
+            return;
+        }
+        let direction = lens.pdf_direction();
+        let to_area = spread(point.ng.dot(lens.wi), lens.distance * lens.distance);
+        let back = vertex.bsdf.pdf(lens.wi, vertex.wo, Transport::Radiance);
+        let split = Split {
+            light: self.out.side.first(s),
+            light_joint: Joint { arrival: AreaPdf(direction.0 * to_area), departure: back },
+            eye: &[Node::origin(lens.pdf)],
+            eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
+            next_event: self.out.next_event,
+            light_can_be_hit: self.out.light_can_be_hit,
+        };
+        let weight = self.this.weigher.weight(&split);
+        let from = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
+        let segment = segment(&from, &SegmentEnd::Free(lens.p_near));
+        self.splat(s, &lens, &segment, (raw, weight), [u[2], u[3]], tracer);
+    }
+
+    /// c_1 of paths whose first two vertices are the light's and `vertex`.
+    fn next_event(&self, vertex: &SurfaceVertex, to_area: f32) -> f32 {
+        let lights = &self.scene.lights;
+        let picked = lights.pmf_from(vertex.point.p, vertex.light_normal, self.id);
+        let light = lights.get(self.id);
+        if light.is_delta() {
+            return picked.0 / self.chosen.0;
+        }
+        let distance = match self.emission.end {
+            LightEnd::Infinite => f32::INFINITY,
+            _ => vertex.edge.distance,
+        };
+        let direct = light.pdf_direct(vertex.point.p, vertex.wo, distance) * picked;
+        direct.0 * to_area / self.out.side.first(1)[0].forward.0
+    }
+}
+
+/// The light's end of a segment.
+fn surface_end(end: LightEnd, emission: &EmissionSample) -> SegmentEnd {
+    match end {
+        LightEnd::Surface { p, error, ng } => SegmentEnd::Surface { p, error, ng },
+        LightEnd::Point { p } => SegmentEnd::Free(p),
+        LightEnd::Infinite => SegmentEnd::Free(emission.origin),
+    }
+}
+
+impl WalkHooks for LightHooks<'_, '_> {
+    fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
+        let (index, point, edge) = (vertex.index, vertex.point, vertex.edge);
+        let dist2 = edge.distance * edge.distance;
+        let cos = point.ng.dot(vertex.wo);
+        if index == 1 {
+            let emission = self.emission;
+            let forward = emission.end.next_density(emission.pdf_position, emission.pdf_direction, cos, dist2);
+            let to_light = match emission.end {
+                LightEnd::Surface { ng, .. } => spread(ng.dot(emission.direction), dist2),
+                LightEnd::Point { .. } => 1.0 / dist2,
+                LightEnd::Infinite => 1.0,
+            };
+            self.out.side.arrive(forward, to_light, survival(vertex.bsdf));
+            self.out.next_event = self.next_event(vertex, to_light);
+        } else {
+            let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
+            self.out.side.arrive(forward, spread(self.cos_leaving, dist2), survival(vertex.bsdf));
+        }
+        if let Some(record) = &mut self.record {
+            record.vertex(false, vertex);
+        }
+        if vertex.bsdf.is_black() {
+            return false;
+        }
+        let s = index as usize + 1;
+        if vertex.bsdf.connectable() {
+            if self.this.weigher.techniques.uses(s, 1) {
+                self.vertex_to_lens(vertex, tracer, sampler);
+            }
+            if self.this.connects {
+                self.out.vertices.push(LightVertex {
+                    point: *point,
+                    bsdf: vertex.bsdf.clone(),
+                    wo: vertex.wo,
+                    throughput: vertex.throughput,
+                    s,
+                });
+            }
+        }
+        true
+    }
+
+    fn leaving(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample) {
+        self.cos_leaving = vertex.point.ng.dot(sample.wi);
+        let reverse = if sample.delta {
+            sample.pdf_reverse_delta
+        } else {
+            vertex.bsdf.pdf(sample.wi, vertex.wo, Transport::Radiance)
+        };
+        self.out.side.leave(reverse, sample.delta);
+        if let Some(record) = &mut self.record {
+            record.leaving(false, sample);
+        }
+    }
+
+    fn escaped(&mut self, _index: u32, _direction: Vec3, _throughput: Rgb, _edge: &Edge) {}
+}

@@ -1,0 +1,398 @@
+//! `bdpt`: bidirectional path tracing (Lafortune & Willems 1993; Veach & Guibas 1994; Veach 1997, §10).
+//!
+//! Every pixel of every iteration traces one eye sub-path z_0 … and one light sub-path y_0 … and joins every prefix of one with every
+//! prefix of the other. What a pair (s, t) is depends on its ends:
+//!
+//! * s = 0: the eye walk met a light;
+//! * s = 1, t ≥ 2: next event, a light point drawn as seen from z_{t−1};
+//! * s ≥ 2, t ≥ 2: a connection, the contribution β_L ρ(y_{s−1}) G V ρ(z_{t−1}) β_E;
+//! * t = 1: y_{s−1} is connected to the lens and lands in whatever pixel sees it: the light image, to which all W · H light
+//!   sub-paths of the full film contribute, also when only part of the picture is rendered.
+//!
+//! Weights are `mis`'s. Shadow rays wait in queues and go out in packets; nothing depends on how these were filled.
+
+mod eye_path;
+mod light_path;
+
+use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params, Replay};
+use crate::film::{Film, FilmTile, LightImage, Part, Pyramid, SampleBuffer, Splat};
+use crate::math::Rgb;
+use crate::math::sampler::PathSampler;
+use crate::mis::{Heuristic, Side, Techniques, Weigher};
+use crate::path::{Limits, ShadowQueue, WalkStart, walk};
+use crate::prepared::{Features, PreparedScene};
+use crate::ray::{Ray, RayKind, RayStats, Tracer};
+use crate::shade::Transport;
+use eye_path::{Arrival, EyeHooks, EyeQueues};
+use light_path::{LensQueue, LightPath};
+use rayon::prelude::*;
+
+/// Parameters that every bidirectional method has.
+pub(super) const MAX_DEPTH: ParamSpec = ParamSpec {
+    name: "max_depth",
+    about: "largest number of edges of a path; 1 shows emitters, 2 adds direct light; -1: no limit",
+    default: ParamDefault::Int(-1, -1, 1_000_000),
+};
+/// See [`MAX_DEPTH`].
+pub(super) const RR_DEPTH: ParamSpec = ParamSpec {
+    name: "rr_depth",
+    about: "vertex (1 is the first hit), counted from either end, from which Russian roulette may end a sub-path",
+    default: ParamDefault::Int(5, 1, 1_000_000),
+};
+/// See [`MAX_DEPTH`].
+pub(super) const HIDE_EMITTERS: ParamSpec = ParamSpec {
+    name: "hide_emitters",
+    about: "emitters that the camera sees directly are black",
+    default: ParamDefault::Bool(false),
+};
+
+/// The registry's line.
+pub static SPEC: IntegratorSpec = IntegratorSpec {
+    name: "bdpt",
+    aliases: &[],
+    about: "Bidirectional path tracing: sub-paths from the camera and from the lights, joined in every way and combined by multiple importance sampling",
+    params: &[
+        MAX_DEPTH,
+        RR_DEPTH,
+        HIDE_EMITTERS,
+        ParamSpec {
+            name: "heuristic",
+            about: "how techniques share a path",
+            default: ParamDefault::Choice("balance", &["balance", "power"]),
+        },
+        ParamSpec {
+            name: "techniques",
+            about: "pairs light:eye of vertex numbers that are joined, e.g. all,-0:* (no hits of lights) or *:1 (light tracing)",
+            default: ParamDefault::Techniques("all"),
+        },
+    ],
+    unbiased: true,
+    refuses: |_| None,
+    cannot: |_| None,
+    build: |params| {
+        let heuristic = if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power };
+        Box::new(Bidirectional::new(params, heuristic, params.techniques("techniques")))
+    },
+};
+
+/// The random streams of sub-paths.
+const EYE_STREAM: u64 = 1;
+const LIGHT_STREAM: u64 = 3;
+/// Light sub-paths in a piece of work outside of the window.
+const LIGHT_PATHS_AT_ONCE: u32 = 1024;
+
+/// A contribution with its technique.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Found {
+    /// Pixel, in pixels of the full picture.
+    pub x: u32,
+    pub y: u32,
+    /// Light sub-path, if it is a splat.
+    pub path: u32,
+    /// Number of the contribution in a replay.
+    pub note: u32,
+    /// Light vertices.
+    pub s: u16,
+    /// Eye vertices.
+    pub t: u16,
+    /// Contribution of the technique by itself.
+    pub raw: Rgb,
+    /// Its weight.
+    pub weight: f32,
+}
+
+/// Bidirectional path tracing with any set of techniques; light tracing is one of them.
+pub(super) struct Bidirectional {
+    limits: Limits,
+    hide_emitters: bool,
+    weigher: Weigher,
+    /// Some connection with s ≥ 2 and t ≥ 2 is used.
+    connects: bool,
+    /// One for each tile of the film, kept for their memory.
+    samples: Vec<SampleBuffer>,
+    pyramid: Option<Pyramid>,
+}
+
+/// What a worker keeps from one pixel to the next.
+struct Worker {
+    light: LightPath,
+    eye: Side,
+    direct: ShadowQueue<Found>,
+    connection: ShadowQueue<Found>,
+    lens: ShadowQueue<Found>,
+    splats: Vec<Splat>,
+    /// All that is visible, if a pyramid is wanted.
+    found: Vec<Found>,
+}
+
+/// What a worker brings back from a piece of work.
+type Piece = (RayStats, Vec<Splat>, Vec<Found>);
+
+impl Worker {
+    fn new() -> Worker {
+        Worker {
+            light: LightPath::default(),
+            eye: Side::default(),
+            direct: ShadowQueue::new(RayKind::ShadowDirect),
+            connection: ShadowQueue::new(RayKind::ShadowConnection),
+            lens: ShadowQueue::new(RayKind::ShadowLens),
+            splats: vec![],
+            found: vec![],
+        }
+    }
+}
+
+/// Adds up what a tile's own eye sub-paths find.
+fn add_to(samples: &mut SampleBuffer, tile: &FilmTile, arrival: Arrival, found: Found) {
+    let part = match arrival {
+        Arrival::Hit => Part::AtOnce,
+        Arrival::Direct => Part::Direct,
+        Arrival::Connection => Part::Connection,
+    };
+    samples.add(part, tile.index(found.x, found.y), found.raw * found.weight);
+}
+
+fn splat(found: Found) -> Splat {
+    let Found { x, y, path, note, s, .. } = found;
+    Splat { x, y, path, vertex: u32::from(s), note, value: found.raw * found.weight }
+}
+
+impl Bidirectional {
+    pub(super) fn new(params: &Params, heuristic: Heuristic, techniques: Techniques) -> Bidirectional {
+        let limits = Limits {
+            max_edges: u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX),
+            roulette_from: params.int("rr_depth") as u32,
+        };
+        Bidirectional {
+            limits,
+            hide_emitters: params.bool("hide_emitters"),
+            connects: techniques.uses_connections(),
+            weigher: Weigher { techniques, heuristic, roulette_from: limits.roulette_from },
+            samples: vec![],
+            pyramid: None,
+        }
+    }
+
+    /// Light sub-paths of an iteration: one for every pixel of the full film.
+    fn light_paths(&self, scene: &PreparedScene) -> f32 {
+        scene.film_size[0] as f32 * scene.film_size[1] as f32
+    }
+
+    /// One light sub-path and its splats.
+    fn light_path(
+        &self,
+        iteration: &Iteration,
+        path: u32,
+        worker: &mut Worker,
+        tracer: &mut Tracer,
+        record: Option<&mut Replay>,
+    ) {
+        // The sub-paths of one iteration are points of one sequence: they are stratified among themselves.
+        let mut sampler = PathSampler::new(iteration.seed, LIGHT_STREAM, iteration.index, u64::from(path));
+        let (splats, all, keep) = (&mut worker.splats, &mut worker.found, self.pyramid.is_some());
+        let mut found = |found: Found| {
+            splats.push(splat(found));
+            if keep {
+                all.push(found);
+            }
+        };
+        let mut lens = LensQueue { queue: &mut worker.lens, found: &mut found, path };
+        light_path::trace(self, iteration.scene, &mut sampler, tracer, &mut worker.light, &mut lens, record);
+    }
+
+    /// One eye sub-path, joined with the worker's light sub-path.
+    fn eye_path(
+        &self,
+        iteration: &Iteration,
+        (x, y): (u32, u32),
+        worker: &mut Worker,
+        tracer: &mut Tracer,
+        found: &mut dyn FnMut(Arrival, Found),
+        record: Option<&mut Replay>,
+    ) {
+        let scene = iteration.scene;
+        let index = u64::from(y) * u64::from(scene.film_size[0]) + u64::from(x);
+        let mut sampler = PathSampler::new(iteration.seed, EYE_STREAM, index, iteration.index);
+        let u = sampler.origin();
+        let (offset, filter) = scene.filter.sample([u[0], u[1]]);
+        let raster = [x as f32 + 0.5 + offset[0], y as f32 + 0.5 + offset[1]];
+        let eye = scene.camera.sample_ray(raster, [u[2], u[3]]);
+        let (lens, direction) = scene.camera.pdf_sampled_ray(eye.direction);
+        worker.eye.begin(lens);
+        let mut hooks = EyeHooks {
+            this: self,
+            scene,
+            light: &worker.light,
+            side: &mut worker.eye,
+            cos_leaving: 0.0,
+            pixel: (x, y),
+            lens: eye.origin,
+            record,
+            queues: &mut EyeQueues { direct: &mut worker.direct, connection: &mut worker.connection, found },
+        };
+        let start = WalkStart {
+            ray: Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far },
+            throughput: Rgb::grey(filter),
+            pdf: direction,
+            delta: false,
+            kind: RayKind::Camera,
+        };
+        walk(scene, start, &self.limits, Transport::Radiance, tracer, &mut sampler, &mut hooks);
+    }
+
+    fn render_tile(
+        &self,
+        iteration: &Iteration,
+        tile: &FilmTile,
+        samples: &mut SampleBuffer,
+        worker: &mut Worker,
+    ) -> Piece {
+        let scene = iteration.scene;
+        let mut tracer = Tracer::new(&*scene.query);
+        samples.clear(tile.pixels());
+        let (mut all, keep) = (vec![], self.pyramid.is_some());
+        let mut found = |arrival: Arrival, found: Found| {
+            add_to(samples, tile, arrival, found);
+            if keep {
+                all.push(found);
+            }
+        };
+        let techniques = &self.weigher.techniques;
+        for pixel in 0..tile.pixels() {
+            let (x, y) = tile.pixel(pixel);
+            if techniques.uses_light_paths() {
+                self.light_path(iteration, y * scene.film_size[0] + x, worker, &mut tracer, None);
+            }
+            if techniques.uses_eye_paths() {
+                self.eye_path(iteration, (x, y), worker, &mut tracer, &mut found, None);
+            }
+        }
+        worker.direct.flush(&mut tracer, |f| found(Arrival::Direct, f));
+        worker.connection.flush(&mut tracer, |f| found(Arrival::Connection, f));
+        worker.found.extend(all);
+        worker.finish(self, tracer)
+    }
+
+    /// Light sub-paths that belong to pixels outside of the window: only their splats matter.
+    fn light_only(&self, iteration: &Iteration, paths: std::ops::Range<u32>, worker: &mut Worker) -> Piece {
+        let scene = iteration.scene;
+        let mut tracer = Tracer::new(&*scene.query);
+        let [x0, y0, width, height] = scene.window;
+        for path in paths {
+            let (x, y) = (path % scene.film_size[0], path / scene.film_size[0]);
+            if x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height {
+                self.light_path(iteration, path, worker, &mut tracer, None);
+            }
+        }
+        worker.finish(self, tracer)
+    }
+}
+
+impl Worker {
+    /// Sends off what is queued for the lens and hands over all that was found.
+    fn finish(&mut self, this: &Bidirectional, mut tracer: Tracer) -> Piece {
+        let (splats, all, keep) = (&mut self.splats, &mut self.found, this.pyramid.is_some());
+        self.lens.flush(&mut tracer, |f| {
+            splats.push(splat(f));
+            if keep {
+                all.push(f);
+            }
+        });
+        (tracer.stats, std::mem::take(splats), std::mem::take(all))
+    }
+}
+
+/// Everything that all pieces of work brought back, in their order.
+#[derive(Default)]
+struct Harvest {
+    stats: RayStats,
+    splats: Vec<Vec<Splat>>,
+    found: Vec<Vec<Found>>,
+}
+
+impl Harvest {
+    fn add(&mut self, pieces: Vec<Piece>) {
+        for (stats, splats, found) in pieces {
+            self.stats.merge(&stats);
+            self.splats.push(splats);
+            self.found.push(found);
+        }
+    }
+}
+
+impl Integrator for Bidirectional {
+    fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
+        let scene = iteration.scene;
+        self.weigher.techniques.set_light_paths(self.light_paths(scene));
+        let mut samples = std::mem::take(&mut self.samples);
+        samples.resize_with(film.tiles.len(), SampleBuffer::default);
+        let this = &*self;
+        let mut harvest = Harvest::default();
+        let tiles = film
+            .tiles
+            .par_iter()
+            .zip(&mut samples)
+            .with_max_len(1)
+            .map_init(Worker::new, |worker, (tile, samples)| this.render_tile(iteration, tile, samples, worker));
+        harvest.add(tiles.collect());
+
+        let light_image = this.weigher.techniques.uses_light_image().then(|| {
+            if scene.features.contains(Features::CROP) {
+                let all = scene.film_size[0] * scene.film_size[1];
+                let outside =
+                    (0..all.div_ceil(LIGHT_PATHS_AT_ONCE)).into_par_iter().map_init(Worker::new, |worker, chunk| {
+                        let first = chunk * LIGHT_PATHS_AT_ONCE;
+                        this.light_only(iteration, first..all.min(first + LIGHT_PATHS_AT_ONCE), worker)
+                    });
+                harvest.add(outside.collect());
+            }
+            LightImage::new(scene.window, std::mem::take(&mut harvest.splats))
+        });
+        film.tiles.par_iter_mut().zip(&samples).for_each(|(tile, samples)| {
+            tile.commit(samples, light_image.as_ref(), iteration.index);
+        });
+        film.iterations += 1;
+        self.samples = samples;
+        if let Some(pyramid) = &mut self.pyramid {
+            for f in harvest.found.iter().flatten() {
+                pyramid.add((f.s.into(), f.t.into()), (f.x, f.y), f.raw, f.weight);
+            }
+            pyramid.iterations += 1;
+        }
+        harvest.stats
+    }
+
+    fn keep_pyramid(&mut self, window: [u32; 4], max_edges: usize) -> bool {
+        self.pyramid = Some(Pyramid::new(window, max_edges));
+        true
+    }
+
+    fn pyramid(&self) -> Option<&Pyramid> {
+        self.pyramid.as_ref()
+    }
+
+    fn replay(&mut self, iteration: &Iteration, (x, y): (u32, u32)) -> Replay {
+        let scene = iteration.scene;
+        self.weigher.techniques.set_light_paths(self.light_paths(scene));
+        let (mut worker, mut tracer, mut replay) =
+            (Worker::new(), Tracer::new(&*scene.query), Replay { pixel: (x, y), ..Replay::default() });
+        let mut seen = vec![];
+        if self.weigher.techniques.uses_light_paths() {
+            let path = y * scene.film_size[0] + x;
+            self.light_path(iteration, path, &mut worker, &mut tracer, Some(&mut replay));
+            // One sub-path may fill a packet and more: what has been answered already is among the splats.
+            seen.extend(worker.splats.drain(..).map(|s| s.note));
+            worker.lens.flush(&mut tracer, |f| seen.push(f.note));
+        }
+        if self.weigher.techniques.uses_eye_paths() {
+            let mut found = |_: Arrival, f: Found| seen.push(f.note);
+            self.eye_path(iteration, (x, y), &mut worker, &mut tracer, &mut found, Some(&mut replay));
+            worker.direct.flush(&mut tracer, |f| seen.push(f.note));
+            worker.connection.flush(&mut tracer, |f| seen.push(f.note));
+        }
+        for note in seen {
+            replay.contributions[note as usize].visible = true;
+        }
+        replay
+    }
+}

@@ -1,0 +1,116 @@
+//! The weights of a path by their definition: all densities of all its vertices from both ends, multiplied up in double
+//! precision logarithms (Veach 1997, §10.2). The oracle of [`Weigher`], and what explains a single sample.
+
+use super::{Weigher, spread};
+use crate::emit::LightEnd;
+use crate::math::Vec3;
+use crate::path::{FullPath, survival};
+use crate::prepared::PreparedScene;
+
+/// Densities of a path's vertices v_0 … v_k.
+#[derive(Clone, Debug)]
+pub struct Densities {
+    /// p_L(v_i), from the light's end, survival of roulette included, for i < k.
+    pub light: Vec<f64>,
+    /// p_E(v_i), from the lens's end.
+    pub eye: Vec<f64>,
+    /// Whether the edge v_{i−1} v_i can be a connection, for i = 1 … k; and for i = 0, whether a ray can meet the light by chance.
+    pub joinable: Vec<bool>,
+    /// c_1, see `mis::weigh`.
+    pub next_event: f64,
+}
+
+/// Densities of `path` where sub-paths play roulette as `weigher` says.
+pub fn densities(scene: &PreparedScene, weigher: &Weigher, path: &FullPath) -> Densities {
+    let k = path.edges();
+    let light = scene.lights.get(path.light);
+    let infinite = light.is_infinite();
+    let chosen = f64::from(scene.lights.pmf(path.light).0);
+    let (position, direction) = light.pdf_emission_given_vertex(path.leaving);
+    // From a density per steradian at v_i's neighbour to v_i's own measure along edge e, whose direction is d.
+    let to_area = |i: usize, e: usize| -> f64 {
+        let (d, distance) = path.edge(e);
+        match i {
+            0 => match path.origin {
+                LightEnd::Surface { ng, .. } => f64::from(spread(ng.dot(d), distance * distance)),
+                LightEnd::Point { .. } => f64::from(distance).powi(-2),
+                LightEnd::Infinite => 1.0,
+            },
+            _ => f64::from(spread(path.interior[i - 1].point.ng.dot(d), distance * distance)),
+        }
+    };
+    // Density per steradian at the interior vertex v_i of the direction `to`, coming from `from`; survival included.
+    let scatter = |i: usize, from: Vec3, to: Vec3, towards_lens: bool| -> f64 {
+        let v = &path.interior[i - 1];
+        let number = if towards_lens { i } else { k - i };
+        let survives = if number >= weigher.roulette_from as usize { survival(&v.bsdf) } else { 1.0 };
+        let pdf = match v.delta {
+            Some(pdfs) => pdfs[usize::from(!towards_lens)],
+            None => v.bsdf.pdf(from, to, crate::shade::Transport::Radiance),
+        };
+        f64::from(pdf.0) * f64::from(survives)
+    };
+
+    let mut from_light = vec![chosen * f64::from(if infinite { direction.0 } else { position.0 })];
+    for i in 1..k {
+        let density = if i == 1 {
+            let cos = f64::from(path.interior[0].point.ng.dot(path.leaving).abs());
+            if infinite { f64::from(position.0) * cos } else { f64::from(direction.0) * to_area(1, 0) }
+        } else {
+            scatter(i - 1, -path.edge(i - 2).0, path.edge(i - 1).0, true) * to_area(i, i - 1)
+        };
+        from_light.push(density);
+    }
+
+    let last = path.edge(k - 1).0;
+    let (lens, view) = scene.camera.pdf_sampled_ray(-last);
+    let mut from_eye = vec![0.0; k + 1];
+    from_eye[k] = f64::from(lens.0);
+    from_eye[k - 1] = f64::from(view.0) * to_area(k - 1, k - 1);
+    for i in (0..k - 1).rev() {
+        from_eye[i] = scatter(i + 1, path.edge(i + 1).0, -path.edge(i).0, false) * to_area(i, i);
+    }
+
+    let smooth = |i: usize| i == 0 || i == k || path.interior[i - 1].delta.is_none();
+    let joinable = (0..=k).map(|i| if i == 0 { !light.is_delta() } else { smooth(i - 1) && smooth(i) }).collect();
+    let next_event = path.interior.first().map_or(1.0, |v| {
+        let picked = f64::from(scene.lights.pmf_from(v.point.p, v.light_normal, path.light).0);
+        if light.is_delta() {
+            return picked / chosen;
+        }
+        let (d, distance) = path.edge(0);
+        picked * f64::from(light.pdf_direct(v.point.p, -d, distance).0) * to_area(0, 0) / from_light[0]
+    });
+    Densities { light: from_light, eye: from_eye, joinable, next_event }
+}
+
+impl Densities {
+    /// ln of n_s c_s p_s for every technique (s, k + 1 − s), s = 0 … k; −∞ for those that cannot make the path.
+    pub fn log_shares(&self, weigher: &Weigher) -> Vec<f64> {
+        let k = self.eye.len() - 1;
+        (0..=k)
+            .map(|s| {
+                let n = f64::from(weigher.techniques.count(s, k + 1 - s));
+                let c = if s == 1 && k >= 2 { self.next_event } else { 1.0 };
+                let possible = if self.joinable[s] { 1.0 } else { 0.0 };
+                let light: f64 = self.light[..s].iter().map(|p| p.ln()).sum();
+                // p_E(v_0) is asked of a light that cannot be hit only where the technique is impossible anyway.
+                let eye: f64 = if possible > 0.0 { self.eye[s..].iter().map(|p| p.ln()).sum() } else { 0.0 };
+                (n * c * possible).ln() + light + eye
+            })
+            .collect()
+    }
+
+    /// The weight of every technique (s, k + 1 − s), s = 0 … k.
+    pub fn weights(&self, weigher: &Weigher) -> Vec<f64> {
+        let logs = self.log_shares(weigher);
+        let beta = match weigher.heuristic {
+            super::Heuristic::Balance => 1.0,
+            super::Heuristic::Power => 2.0,
+        };
+        let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let shares: Vec<f64> = logs.iter().map(|l| (beta * (l - top)).exp()).collect();
+        let sum: f64 = shares.iter().sum();
+        shares.iter().map(|x| if *x > 0.0 { x / sum } else { 0.0 }).collect()
+    }
+}

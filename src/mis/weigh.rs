@@ -1,0 +1,118 @@
+//! The weight of one sampled path among all techniques that make it.
+//!
+//! A path x̄ = v_0 … v_k with v_0 on a light and v_k on the lens is made by the techniques (s, k + 1 − s). Each takes n_s samples with the
+//! density p_s = Π_{i<s} p_L(v_i) · Π_{i≥s} p_E(v_i) times a factor c_s, and gets the weight
+//!
+//! w_s = (n_s c_s p_s)^β / Σ_i (n_i c_i p_i)^β   (Veach 1997, eqs. 9.8 and 10.9).
+//!
+//! Neighbours differ by one vertex, p_{s+1} / p_s = p_L(v_s) / p_E(v_s), so the sum is taken over products of the ratios that the two
+//! [`Side`](super::Side)s keep, going outwards from the connection. Only four ratios depend on the connection itself: those
+//! of its two end vertices and of the two vertices behind them.
+//!
+//! Factors: c_0 = 0 if no ray can meet the light by chance; c_1 = p_direct(v_0 | v_1) / p_L(v_0) where t ≥ 2, since those techniques
+//! draw their light point as seen from v_1 (*next event*) and not as light sub-paths do; all others are 1, or 0 if an end of the
+//! connection is a delta event. Roulette is part of the densities: where it is played is counted from the end that walks.
+
+use super::side::Node;
+use super::{Heuristic, Techniques};
+use crate::math::{AreaPdf, SolidAnglePdf};
+
+/// How the last vertex of a side would have been walked through from the other end.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint {
+    /// Area density of that vertex, survival at the other side's last vertex included.
+    pub arrival: AreaPdf,
+    /// Density per steradian there of the direction to the vertex before it. (For a light that was hit: its emission's density of
+    /// direction; of a light at infinity: the density of its disk.)
+    pub departure: SolidAnglePdf,
+}
+
+/// A path as it was sampled.
+#[derive(Clone, Copy, Debug)]
+pub struct Split<'a> {
+    /// The s vertices of the light sub-path that it uses.
+    pub light: &'a [Node],
+    /// How the eye sub-path would have gone on into them; unused if there are none.
+    pub light_joint: Joint,
+    /// The t vertices of the eye sub-path that it uses.
+    pub eye: &'a [Node],
+    /// How the light sub-path would have gone on into them; unused if t = 1.
+    pub eye_joint: Joint,
+    /// c_1: density of v_0 under next event from v_1 over its density as origin of a light sub-path.
+    pub next_event: f32,
+    /// c_0 = 1: rays can meet the light by chance.
+    pub light_can_be_hit: bool,
+}
+
+/// Everything that weights depend on besides the path.
+#[derive(Clone, Debug)]
+pub struct Weigher {
+    /// Techniques and their samples.
+    pub techniques: Techniques,
+    /// β.
+    pub heuristic: Heuristic,
+    /// First vertex, counted from the end that walks, at which roulette is played.
+    pub roulette_from: u32,
+}
+
+impl Weigher {
+    /// n_s c_s, connectability apart.
+    #[inline]
+    fn share(&self, s: usize, t: usize, path: &Split) -> f32 {
+        let n = self.techniques.count(s, t);
+        match s {
+            0 if !path.light_can_be_hit => 0.0,
+            1 if t >= 2 => n * path.next_event,
+            _ => n,
+        }
+    }
+
+    /// Survival at a vertex that is number `index` counted from the other end.
+    #[inline]
+    fn survival(&self, node: &Node, index: usize) -> f32 {
+        if index >= self.roulette_from as usize { node.survival } else { 1.0 }
+    }
+
+    /// Σ over the techniques that have fewer than all vertices of `side`, relative to the one that has all of them and the factor 1;
+    /// `other` is the number of vertices of the other side, `share(n)` the share of the technique with n vertices on this side.
+    #[inline]
+    fn outward(&self, side: &[Node], joint: &Joint, other: usize, share: impl Fn(usize) -> f32) -> f32 {
+        let n = side.len();
+        let mut product = 1.0;
+        let mut sum = 0.0;
+        for i in (0..n).rev() {
+            let ratio = if i + 1 == n {
+                joint.arrival.0 / side[i].forward.0
+            } else if i + 2 == n {
+                let last = &side[n - 1];
+                joint.departure.0 * self.survival(last, other) * last.spread / side[i].forward.0
+            } else {
+                side[i].ratio * self.survival(&side[i + 1], n - 2 - i + other)
+            };
+            product *= self.heuristic.power(ratio);
+            if product == 0.0 {
+                break;
+            }
+            // The technique's connection is the edge from vertex i − 1 to vertex i of this side.
+            let smooth = i == 0 || (side[i - 1].smooth && (i + 1 == n || side[i].smooth));
+            if smooth {
+                let term = self.heuristic.power(share(i));
+                if term > 0.0 {
+                    sum += product * term;
+                }
+            }
+        }
+        sum
+    }
+
+    /// The weight of the technique that sampled the path.
+    #[inline]
+    pub fn weight(&self, path: &Split) -> f32 {
+        let (s, t) = (path.light.len(), path.eye.len());
+        let edges = s + t;
+        let own = self.heuristic.power(self.share(s, t, path));
+        let others = self.outward(path.light, &path.light_joint, t, |n| self.share(n, edges - n, path))
+            + self.outward(path.eye, &path.eye_joint, s, |n| self.share(edges - n, n, path));
+        own / (own + others)
+    }
+}

@@ -1,0 +1,66 @@
+//! A whole path, seen from neither end: v_0 on a light, v_1 … v_{k−1} on surfaces, v_k on the lens.
+//!
+//! Renders never need it. It is what slow definitions are written for, in tests and where a single sample is explained.
+
+use crate::emit::{LightEnd, LightId};
+use crate::math::{SolidAnglePdf, Vec3};
+use crate::shade::{Bsdf, SurfacePoint};
+
+/// A vertex between the two ends.
+#[derive(Clone, Debug)]
+pub struct Interior {
+    /// The point.
+    pub point: SurfacePoint,
+    /// The BSDF there, resolved for either of the two directions of the path.
+    pub bsdf: Bsdf,
+    /// See [`SurfaceVertex::light_normal`](super::SurfaceVertex).
+    pub light_normal: Option<Vec3>,
+    /// Of a delta event: the discrete probabilities of going on towards the lens when coming from the light, and the reverse.
+    pub delta: Option<[SolidAnglePdf; 2]>,
+}
+
+/// A path of k edges.
+#[derive(Clone, Debug)]
+pub struct FullPath {
+    /// The light that v_0 is on.
+    pub light: LightId,
+    /// v_0.
+    pub origin: LightEnd,
+    /// Unit direction that leaves v_0.
+    pub leaving: Vec3,
+    /// v_1 … v_{k−1}.
+    pub interior: Vec<Interior>,
+    /// v_k, a point of the lens.
+    pub lens: Vec3,
+}
+
+impl FullPath {
+    /// k.
+    pub fn edges(&self) -> usize {
+        self.interior.len() + 1
+    }
+
+    /// Position of v_i; `None` at infinity.
+    pub fn position(&self, i: usize) -> Option<Vec3> {
+        if i == 0 {
+            match self.origin {
+                LightEnd::Surface { p, .. } | LightEnd::Point { p } => Some(p),
+                LightEnd::Infinite => None,
+            }
+        } else {
+            Some(self.interior.get(i - 1).map_or(self.lens, |v| v.point.p))
+        }
+    }
+
+    /// Unit direction from v_i to v_{i+1}, and their distance (infinite if v_i is at infinity).
+    pub fn edge(&self, i: usize) -> (Vec3, f32) {
+        match (self.position(i), self.position(i + 1)) {
+            (Some(a), Some(b)) => {
+                let d = b - a;
+                let length = d.length();
+                (d / length, length)
+            }
+            _ => (self.leaving, f32::INFINITY),
+        }
+    }
+}

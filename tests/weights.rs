@@ -1,0 +1,173 @@
+//! Weights of sampled paths against their definition, for every technique, any subset of techniques, and scenes with every
+//! feature: they sum to one, the fast ones are the slow ones, and they depend on nothing that they should not.
+
+#[path = "scenes/gallery.rs"]
+mod gallery;
+mod scenes;
+
+use gallery::{GALLERY, exhibit};
+use lightsieve::integrators::replay::Contribution;
+use lightsieve::integrators::{Iteration, Params, bdpt};
+use lightsieve::math::{AreaPdf, SolidAnglePdf};
+use lightsieve::mis::definition::{Densities, densities};
+use lightsieve::mis::{Heuristic, Joint, Node, Split, Techniques, Weigher};
+use lightsieve::path::FullPath;
+use lightsieve::prepared::PreparedScene;
+use lightsieve::ray::Backend;
+use scenes::{parse, prepare};
+
+/// Every path that bidirectional path tracing finds in a grid of pixels.
+fn found(scene: &PreparedScene, params: &[(&str, &str)], iterations: u64) -> Vec<Contribution> {
+    let mut values = Params::defaults(&bdpt::SPEC);
+    for (name, value) in params {
+        values.set(name, value).unwrap();
+    }
+    let mut integrator = (bdpt::SPEC.build)(&values);
+    let [x0, y0, width, height] = scene.window;
+    let mut all = vec![];
+    for index in 0..iterations {
+        for i in 0..16 {
+            let pixel = (x0 + (i % 4) * width / 4, y0 + (i / 4) * height / 4);
+            all.extend(integrator.replay(&Iteration { scene, seed: 5, index }, pixel).contributions);
+        }
+    }
+    all
+}
+
+fn weigher(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, roulette_from: u32) -> Weigher {
+    let mut techniques = Techniques::parse(techniques).unwrap();
+    techniques.set_light_paths(scene.film_size[0] as f32 * scene.film_size[1] as f32);
+    Weigher { techniques, heuristic, roulette_from }
+}
+
+const SUBSETS: [&str; 6] = ["all", "-*:1", "-0:*", "-1:*", "all,-2:2,-3:1,-0:3", "-*:1,-0:*"];
+
+#[test]
+fn fast_weights_are_those_of_the_definition() {
+    let mut checked = 0;
+    for name in GALLERY {
+        for crop in [None, Some([1, 1, 5, 4])] {
+            let scene = prepare(exhibit(name), Backend::default_available(), crop);
+            for (i, techniques) in SUBSETS.into_iter().enumerate() {
+                let heuristic = ["balance", "power"][i % 2];
+                let roulette = ["5", "1", "2"][i % 3];
+                let params = [("techniques", techniques), ("heuristic", heuristic), ("rr_depth", roulette)];
+                for c in found(&scene, &params, 12) {
+                    let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
+                    let what = format!("{name} {crop:?} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
+                    assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
+                    assert!((f64::from(c.weight) - c.techniques[s].1).abs() < 1e-4, "{} {what}", c.weight);
+                    checked += 1;
+                }
+            }
+        }
+    }
+    assert!(checked > 60_000, "{checked}");
+}
+
+/// Weight of the technique with s light vertices, evaluated as if it had sampled the path. What the evaluation must not look at is
+/// poisoned.
+fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
+    let k = d.eye.len() - 1;
+    const POISON: f32 = -1000.0;
+    // Survival is part of both densities here.
+    let side = |n: usize, own: &dyn Fn(usize) -> f64, other: &dyn Fn(usize) -> f64, smooth: &dyn Fn(usize) -> bool| {
+        let nodes: Vec<Node> = (0..n)
+            .map(|i| Node {
+                forward: AreaPdf(own(i) as f32),
+                spread: 1.0,
+                survival: 1.0,
+                ratio: if i + 2 < n { (other(i) / own(i)) as f32 } else { POISON },
+                smooth: i + 1 < n && smooth(i),
+            })
+            .collect();
+        let joint = Joint {
+            arrival: AreaPdf(if n >= 1 { other(n - 1) as f32 } else { POISON }),
+            departure: SolidAnglePdf(if n >= 2 { other(n - 2) as f32 } else { POISON }),
+        };
+        (nodes, joint)
+    };
+    // A vertex has smooth events unless no edge beside it can be a connection.
+    let smooth = |i: usize| i == 0 || i == k || d.joinable[i] || d.joinable[i + 1];
+    let light = |i: usize| d.light.get(i).copied().unwrap_or(0.0);
+    let (light_nodes, light_joint) = side(s, &light, &|i| d.eye[i], &smooth);
+    let (eye_nodes, eye_joint) = side(k + 1 - s, &|i| d.eye[k - i], &|i| light(k - i), &|i| smooth(k - i));
+    weigher.weight(&Split {
+        light: &light_nodes,
+        light_joint,
+        eye: &eye_nodes,
+        eye_joint,
+        next_event: d.next_event as f32,
+        light_can_be_hit: d.joinable[0],
+    })
+}
+
+#[test]
+fn weights_of_all_techniques_sum_to_one() {
+    let mut checked = 0;
+    for name in GALLERY {
+        let scene = prepare(exhibit(name), Backend::default_available(), None);
+        let paths: Vec<FullPath> = found(&scene, &[], 3).into_iter().filter_map(|c| c.path).collect();
+        for path in &paths {
+            for (i, techniques) in SUBSETS.into_iter().enumerate() {
+                let weigher = weigher(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], 5);
+                let d = densities(&scene, &weigher, path);
+                let slow = d.weights(&weigher);
+                // A subset need not have any technique that makes the path; single precision has no densities beyond its range.
+                let extreme = |p: &f64| *p > 0.0 && !(1e-15..1e15).contains(p);
+                if slow.iter().all(|w| w.is_nan() || *w == 0.0) || d.light.iter().chain(&d.eye).any(extreme) {
+                    continue;
+                }
+                let possible = |s: &usize| d.log_shares(&weigher)[*s] > f64::NEG_INFINITY;
+                let sum: f32 = (0..slow.len()).filter(possible).map(|s| fast(&weigher, &d, s)).sum();
+                assert!((sum - 1.0).abs() < 1e-5, "{name} {techniques}: {sum}, {slow:?}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 15_000, "{checked}");
+}
+
+/// One room at three scales: the same random numbers give the same paths and weights.
+#[test]
+fn weights_do_not_depend_on_the_unit_of_length() {
+    let room = |scale: f64| {
+        let at = |x: f64, y: f64, z: f64| format!("{}, {}, {}", scale * x, scale * y, scale * z);
+        let wall = |bsdf: &str, more: &str, to_world: String| {
+            format!(
+                r#"<shape type="rectangle"><transform name="to_world">{to_world}<scale value="{scale}"/></transform>{bsdf}{more}</shape>"#
+            )
+        };
+        let grey = r#"<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>"#;
+        let gloss =
+            r#"<bsdf type="twosided"><bsdf type="roughconductor"><float name="alpha" value="0.3"/></bsdf></bsdf>"#;
+        let lamp = r#"<emitter type="area"><rgb name="radiance" value="5"/></emitter>"#;
+        let xml = format!(
+            r#"<sensor type="perspective"><float name="fov" value="60"/><float name="near_clip" value="{}"/><float name="far_clip" value="{}"/>
+            <transform name="to_world"><lookat origin="{}" target="{}" up="0, 1, 0"/></transform>
+            <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/><rfilter type="box"/></film></sensor>"#,
+            0.01 * scale,
+            100.0 * scale,
+            at(0.0, 0.1, 0.9),
+            at(0.0, 0.0, 0.0)
+        ) + &wall(grey, "", r#"<translate z="-1"/>"#.into())
+            + &wall(gloss, "", r#"<rotate x="1" angle="-90"/><translate y="-1"/>"#.into())
+            + &wall(grey, lamp, r#"<rotate x="1" angle="90"/><scale value="0.4"/><translate y="1"/>"#.into())
+            + &wall(grey, "", r#"<rotate y="1" angle="90"/><translate x="-1"/>"#.into());
+        found(&prepare(parse(&xml, &[]), Backend::default_available(), None), &[], 16)
+    };
+    let unit = room(1.0);
+    assert!(unit.len() > 500, "{}", unit.len());
+    for scale in [1e-4, 1e4] {
+        let other = room(scale);
+        let mut compared = 0;
+        for (a, b) in unit.iter().zip(&other) {
+            // Rounding may turn a ray to another triangle; from there on the walks differ.
+            if (a.s, a.t) == (b.s, b.t) && (a.raw.g - b.raw.g).abs() < 1e-3 * a.raw.g {
+                assert!((a.weight - b.weight).abs() < 1e-3, "{scale} ({}, {}): {} {}", a.s, a.t, a.weight, b.weight);
+                compared += 1;
+            }
+        }
+        assert!(compared > unit.len() / 2, "{compared} of {}", unit.len());
+    }
+}
