@@ -25,6 +25,7 @@ pub mod ray;
 pub mod shade;
 pub mod emit;
 pub mod prepared;
+pub mod spatial;
 pub mod path;
 pub mod mis;
 pub mod film;

@@ -28,7 +28,7 @@ fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Inte
 fn run(scene: &PreparedScene, integrator: &mut dyn Integrator, spp: u64, seed: u64) -> Film {
     let mut film = Film::new(scene.window);
     let budget = Budget { iterations: Some(spp), time: None };
-    render(scene, integrator, &mut film, seed, budget, &AtomicBool::new(false), |_, _| {});
+    render(scene, integrator, &mut film, seed, budget, &AtomicBool::new(false), |_, _, _| {});
     assert_eq!(film.non_finite(), (0, vec![]));
     film
 }

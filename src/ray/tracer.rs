@@ -25,11 +25,15 @@ pub enum RayKind {
     ShadowLens,
     /// Between two sub-paths.
     ShadowConnection,
+    /// An edge of a sub-path that makes cache points.
+    Cache,
+    /// Between a cache point and a light vertex.
+    ShadowPmf,
 }
 
 impl RayKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [RayKind; 7] = [
+    pub const ALL: [RayKind; 9] = [
         RayKind::Camera,
         RayKind::Bounce,
         RayKind::ShadowDirect,
@@ -37,6 +41,8 @@ impl RayKind {
         RayKind::LightBounce,
         RayKind::ShadowLens,
         RayKind::ShadowConnection,
+        RayKind::Cache,
+        RayKind::ShadowPmf,
     ];
 
     /// Name in statistics.
@@ -49,6 +55,8 @@ impl RayKind {
             RayKind::LightBounce => "light_bounce",
             RayKind::ShadowLens => "shadow_lens",
             RayKind::ShadowConnection => "shadow_connection",
+            RayKind::Cache => "cache",
+            RayKind::ShadowPmf => "shadow_pmf",
         }
     }
 }

@@ -48,6 +48,8 @@ pub struct BsdfSample {
     pub pdf: SolidAnglePdf,
     /// Of a delta event: the discrete probability of the reverse event (`wo` given `wi`); otherwise unused.
     pub pdf_reverse_delta: SolidAnglePdf,
+    /// Of a delta event drawn for radiance: the value of the reverse event for importance; otherwise unused.
+    pub reverse_delta: Rgb,
     /// The direction is one of finitely many.
     pub delta: bool,
     /// The ray goes straight through as if nothing were there (mask, null).
@@ -262,6 +264,7 @@ impl Bsdf {
             value,
             pdf,
             pdf_reverse_delta: SolidAnglePdf(0.0),
+            reverse_delta: Rgb::BLACK,
             delta: false,
             passes_through: false,
             eta,
@@ -320,12 +323,16 @@ impl Bsdf {
         let (o, i) = (self.frame.to_local(wo), frame.to_world(event.b));
         let wi = if event.passes_through { -wo } else { self.frame.to_world(i).normalize() };
         let mut value = event.value * leaf.weight;
+        let mut reverse_value = value;
         if !event.passes_through {
             let inside = match mode {
                 Transport::Radiance => link::enter(&self.links, leaf.link, o, i)?,
                 Transport::Importance => link::enter(&self.links, leaf.link, i, o)?,
             };
             value *= inside.shadowing;
+            // Walked from `wi` to `wo`: no η², and the cosines exchanged.
+            let cosines = self.geometric_ratio(wi, wo) * event.b.z.abs() / a.z.abs();
+            reverse_value = value * (event.eta * event.eta * cosines);
             if mode == Transport::Importance {
                 let cos = event.b.z.abs();
                 if cos == 0.0 {
@@ -340,6 +347,7 @@ impl Bsdf {
             value,
             pdf: SolidAnglePdf(share * event.pdf),
             pdf_reverse_delta: SolidAnglePdf(reverse * event.pdf_reverse),
+            reverse_delta: reverse_value,
             delta: true,
             passes_through: event.passes_through,
             eta: event.eta,
