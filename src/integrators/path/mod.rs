@@ -7,10 +7,10 @@
 //! delta lobe by hits alone, each with weight one.
 
 use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params};
-use crate::emit::{DirectSample, LightEnd};
+use crate::emit::{DirectSample, Light, LightEnd};
 use crate::film::{Film, FilmTile, SampleBuffer};
 use crate::math::sampler::{PathSampler, Purpose};
-use crate::math::{Rgb, SolidAnglePdf, Vec3};
+use crate::math::{Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Heuristic;
 use crate::path::{Edge, Limits, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
@@ -107,6 +107,8 @@ impl Integrator for PathTracer {
         let stats = film
             .tiles
             .par_iter_mut()
+            // A tile is much more work than handing it over, and larger pieces leave threads idle at the end of an iteration.
+            .with_max_len(1)
             .map_init(SampleBuffer::default, |samples, tile| this.render_tile(iteration, tile, samples))
             .reduce(RayStats::default, |mut a, b| {
                 a.merge(&b);
@@ -147,7 +149,25 @@ impl Gather<'_> {
         let lights = &self.scene.lights;
         let point = vertex.point;
         let Some((id, chosen)) = lights.pick_from(point.p, vertex.light_normal, u[0]) else { return };
-        let Some(light) = lights.get(id).sample_direct(point.p, [u[1], u[2]]) else { return };
+        // The same twice: the sample of a triangle, by far the most common, stays in registers; one of any kind goes through memory.
+        match lights.get(id) {
+            Light::Triangle(light) => {
+                if let Some(light) = light.sample_direct(point.p, [u[1], u[2]]) {
+                    self.connect(vertex, &light, chosen, tracer);
+                }
+            }
+            light => {
+                if let Some(light) = light.sample_direct(point.p, [u[1], u[2]]) {
+                    self.connect(vertex, &light, chosen, tracer);
+                }
+            }
+        }
+    }
+
+    /// Queues what the light sample `light` brings, which was drawn from a light chosen with probability `chosen`.
+    #[inline(always)]
+    fn connect(&mut self, vertex: &SurfaceVertex, light: &DirectSample, chosen: Pmf, tracer: &mut Tracer) {
+        let point = vertex.point;
         let (value, bsdf_pdf) = vertex.bsdf.eval_and_pdf(vertex.wo, light.wi, Transport::Radiance);
         if value.is_black() {
             return;
@@ -164,7 +184,7 @@ impl Gather<'_> {
         if contribution.is_black() {
             return;
         }
-        let segment = shadow_segment(point.p, point.error, point.ng, &light);
+        let segment = shadow_segment(point.p, point.error, point.ng, light);
         let samples = &mut *self.samples;
         self.queue.push(&segment, contribution, self.pixel, tracer, |pixel, light| samples.add_late(pixel, light));
     }
