@@ -28,7 +28,7 @@ pub use material::{Features, Material, MaterialSet};
 use super::{SurfacePoint, Transport};
 use crate::math::{Frame, Rgb, SolidAnglePdf, Vec3};
 use arrayvec::ArrayVec;
-use diffuse::Diffuse;
+use diffuse::Lambert;
 use link::{Link, ROOT};
 use lobe::{DeltaSample, Lobe, LobeSample};
 
@@ -87,8 +87,9 @@ pub struct Bsdf {
     links: ArrayVec<Link, MAX_LINKS>,
     /// 1 / sum of the picks of the active leaves, seen from the front and from the back.
     pick_scale: [f32; 2],
-    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited and `leaves` stay empty.
-    lambert: Option<Diffuse>,
+    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited: `leaves` stay empty and `frame` is
+    /// left as it was. (Copying it would read in one piece what has just been written in several, and processors stall on that.)
+    lambert: Option<Lambert>,
 }
 
 /// Index into the arrays of two sides.
@@ -114,19 +115,10 @@ impl Bsdf {
     #[inline]
     fn clear(&mut self, point: &SurfacePoint) {
         self.ng = point.ng;
-        self.frame = point.frame;
         self.leaves.clear();
         self.links.clear();
         self.pick_scale = [0.0; 2];
         self.lambert = None;
-    }
-
-    /// A single Lambertian lobe, if it is on the viewer's side.
-    #[inline]
-    fn set_lambert(&mut self, reflectance: Rgb, behind: bool) {
-        if !behind {
-            self.lambert = Some(Diffuse { reflectance });
-        }
     }
 
     /// Normalises the choice of lobes; called once all leaves are in.
@@ -160,16 +152,15 @@ impl Bsdf {
     #[inline]
     pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
         match &self.lambert {
-            Some(diffuse) => {
-                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
-                if cos_o <= 0.0 || cos_i <= 0.0 {
+            Some(lambert) => {
+                let Some((cos_o, cos_i)) = lambert.cosines(wo, wi) else {
                     return (Rgb::BLACK, SolidAnglePdf(0.0));
-                }
+                };
                 let pdf = cos_i * std::f32::consts::FRAC_1_PI;
                 let value = match mode {
-                    Transport::Radiance => diffuse.reflectance * pdf,
+                    Transport::Radiance => lambert.reflectance * pdf,
                     Transport::Importance => {
-                        diffuse.reflectance * (cos_o * std::f32::consts::FRAC_1_PI * self.geometric_ratio(wo, wi))
+                        lambert.reflectance * (cos_o * std::f32::consts::FRAC_1_PI * self.geometric_ratio(wo, wi))
                     }
                 };
                 (value, SolidAnglePdf(pdf))
@@ -200,9 +191,8 @@ impl Bsdf {
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> SolidAnglePdf {
         match &self.lambert {
-            Some(_) => {
-                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
-                SolidAnglePdf(if cos_o > 0.0 && cos_i > 0.0 { cos_i * std::f32::consts::FRAC_1_PI } else { 0.0 })
+            Some(lambert) => {
+                SolidAnglePdf(lambert.cosines(wo, wi).map_or(0.0, |(_, cos_i)| cos_i * std::f32::consts::FRAC_1_PI))
             }
             None => SolidAnglePdf(self.pdf_local(self.frame.to_local(wo), self.frame.to_local(wi))),
         }
@@ -213,10 +203,10 @@ impl Bsdf {
     #[inline]
     pub fn pdf_both(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> (SolidAnglePdf, SolidAnglePdf) {
         match &self.lambert {
-            Some(_) => {
-                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
-                let inside = if cos_o > 0.0 && cos_i > 0.0 { std::f32::consts::FRAC_1_PI } else { 0.0 };
-                (SolidAnglePdf(cos_i * inside), SolidAnglePdf(cos_o * inside))
+            Some(lambert) => {
+                let (cos_o, cos_i) = lambert.cosines(wo, wi).unwrap_or((0.0, 0.0));
+                let scale = std::f32::consts::FRAC_1_PI;
+                (SolidAnglePdf(cos_i * scale), SolidAnglePdf(cos_o * scale))
             }
             None => {
                 let (o, i) = (self.frame.to_local(wo), self.frame.to_local(wi));
@@ -248,10 +238,7 @@ impl Bsdf {
     #[inline]
     pub fn sample(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
         match &self.lambert {
-            Some(diffuse) => {
-                let local = diffuse.sample_direction(Vec3::new(0.0, 0.0, wo.dot(self.frame.n)), u)?;
-                self.smooth_sample(wo, self.frame.to_world(local), 1.0, mode)
-            }
+            Some(lambert) => self.smooth_sample(wo, lambert.sample_direction(u), 1.0, mode),
             None => self.sample_general(wo, u, mode),
         }
     }
@@ -358,8 +345,8 @@ impl Bsdf {
     /// whichever side the point is reached.
     #[inline]
     pub fn albedo(&self) -> Rgb {
-        if let Some(diffuse) = &self.lambert {
-            return diffuse.reflectance;
+        if let Some(lambert) = &self.lambert {
+            return lambert.reflectance;
         }
         let seen =
             |s: usize| -> Rgb { self.leaves.iter().filter(|l| l.active[s]).map(|l| l.lobe.albedo() * l.weight).sum() };
@@ -370,7 +357,7 @@ impl Bsdf {
     /// True if a connection to this point can carry light: some lobe is not a delta.
     #[inline]
     pub fn connectable(&self) -> bool {
-        self.lambert.is_some() || self.leaves.iter().any(|leaf| leaf.lobe.is_smooth())
+        self.lambert.is_some_and(|l| !l.reflectance.is_black()) || self.leaves.iter().any(|leaf| leaf.lobe.is_smooth())
     }
 }
 
