@@ -186,16 +186,18 @@ impl Camera {
     }
 
     /// The ray through a raster position (pixels of the full film) and a point of the lens.
+    #[inline]
     pub fn sample_ray(&self, raster: [f32; 2], lens_u: [f32; 2]) -> CameraRay {
-        let at = Vec2::from(raster) / self.size + self.principal;
-        let in_focus = ((Vec2::ONE - at * 2.0) * self.half * self.focus).extend(self.focus);
+        let on_plane = (Vec2::ONE - self.principal * 2.0 - Vec2::from(raster) * (2.0 / self.size)) * self.half;
         let lens = self.lens_point(lens_u);
-        let d = (in_focus - lens).normalize();
+        // Scaled so that its z component is one: the planes of the clipping distances are then that many lengths away.
+        let d = (on_plane - lens.truncate() / self.focus).extend(1.0);
+        let length = d.length();
         CameraRay {
             origin: self.position + self.orientation.to_world(lens),
             direction: self.orientation.to_world(d).normalize(),
-            t_near: self.near / d.z,
-            t_far: self.far / d.z,
+            t_near: self.near * length,
+            t_far: self.far * length,
         }
     }
 

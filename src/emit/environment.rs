@@ -37,6 +37,14 @@ impl Environment {
         }
     }
 
+    /// [`Environment::sample`], with the radiance of the direction.
+    pub fn sample_radiance(&self, u: [f32; 2]) -> Option<(Vec3, SolidAnglePdf, Rgb)> {
+        match self {
+            Environment::Map(map) => map.sample_radiance(u),
+            _ => self.sample(u).map(|(dir, pdf)| (dir, pdf, self.radiance(dir))),
+        }
+    }
+
     /// Density of [`Environment::sample`] per steradian; positive wherever there is light.
     pub fn pdf(&self, dir: Vec3) -> SolidAnglePdf {
         match self {
@@ -97,8 +105,7 @@ impl EnvironmentLight {
 
     /// See [`super::Light::sample_direct`].
     pub fn sample_direct(&self, u: [f32; 2]) -> Option<DirectSample> {
-        let (wi, pdf) = self.environment.sample(u)?;
-        let radiance = self.environment.radiance(wi);
+        let (wi, pdf, radiance) = self.environment.sample_radiance(u)?;
         (!radiance.is_black() && pdf.0 > 0.0 && pdf.0.is_finite()).then_some(DirectSample {
             wi,
             distance: f32::INFINITY,

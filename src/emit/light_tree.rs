@@ -3,6 +3,9 @@
 //! Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting" (bounds of §4.1, the surface area
 //! orientation heuristic of §4.4, importance of §5.1 without splitting), with the distance kept from falling below the node's radius.
 //! A walk from the root draws one light; the probability of any light is the product along its own path, which is kept as bits.
+//!
+//! The walk ends early at a set of lights that face nearly one way and are seen under a small angle (`Node::is_one_from`): they are as
+//! good as one light, and one of them is chosen by its power. A finely tessellated emitter then costs a few levels, not all of them.
 
 use super::light::Light;
 use crate::math::float::ONE_MINUS_EPSILON;
@@ -101,8 +104,19 @@ struct Node {
     sin_spread: f32,
     cos_emission: f32,
     power: f32,
+    /// Squared distance of `centre` from which on the node counts as one light; infinite if it is too wide open, or a leaf.
+    one_from2: f32,
     link: Link,
+    /// Its lights are places `begin..end` of the tree's order.
+    begin: u32,
+    end: u32,
 }
+
+/// A set of lights whose normals differ by no more than this from their axis, in radians …
+const ONE_SPREAD: f32 = 0.2;
+/// … and whose radius is at most this part of the distance, counts as one light. Distance and cosines vary by a tenth or two over it,
+/// which is little beside what visibility and the BSDF leave.
+const ONE_RADIUS: f32 = 0.1;
 
 #[derive(Clone, Copy, Debug)]
 enum Link {
@@ -122,49 +136,56 @@ fn with_sine(cos: f32) -> (f32, f32) {
 }
 
 impl Node {
-    fn new(b: &Bounds, link: Link) -> Node {
+    fn new(b: &Bounds, link: Link, range: std::ops::Range<usize>) -> Node {
         let (sin_spread, cos_spread) = b.cone.spread.sin_cos();
+        let radius2 = 0.25 * (b.max - b.min).length_squared();
+        let one = matches!(link, Link::Inner(_)) && b.cone.spread <= ONE_SPREAD;
         Node {
             centre: b.centre(),
-            radius2: 0.25 * (b.max - b.min).length_squared(),
+            radius2,
             axis: b.cone.axis,
             cos_spread,
             sin_spread,
             cos_emission: b.cone.emission.cos(),
             power: b.power,
+            one_from2: if one { radius2 / (ONE_RADIUS * ONE_RADIUS) } else { f32::INFINITY },
             link,
+            begin: range.start as u32,
+            end: range.end as u32,
         }
     }
 
+    /// Whether the lights below need not be told apart at the point `p`.
+    #[inline]
+    fn is_one_from(&self, p: Vec3) -> bool {
+        self.centre.distance_squared(p) > self.one_from2
+    }
+
     /// An estimate of the light that arrives; zero only if none can.
+    #[inline]
     fn importance(&self, p: Vec3, n: Option<Vec3>) -> f32 {
         let to = self.centre - p;
         let d2 = to.length_squared();
-        let floor = d2.max(self.radius2).max(f32::MIN_POSITIVE);
-        if d2 <= self.radius2 || d2 == 0.0 {
-            return self.power / floor;
+        if d2 <= self.radius2 || d2 < f32::MIN_POSITIVE {
+            return self.power / d2.max(self.radius2).max(f32::MIN_POSITIVE);
         }
-        let wi = to / d2.sqrt();
+        let inverse_d2 = 1.0 / d2;
+        let wi = to * inverse_d2.sqrt();
         // Half angle under which the bounding sphere is seen.
         let seen = {
-            let sin2 = self.radius2 / d2;
+            let sin2 = self.radius2 * inverse_d2;
             ((1.0 - sin2).max(0.0).sqrt(), sin2.sqrt())
         };
-        let (cos, sin) = with_sine((-self.axis.dot(wi)).clamp(-1.0, 1.0));
-        let beyond = subtract(subtract((cos, sin), (self.cos_spread, self.sin_spread)), seen);
+        let facing = with_sine((-self.axis.dot(wi)).clamp(-1.0, 1.0));
+        let beyond = subtract(subtract(facing, (self.cos_spread, self.sin_spread)), seen);
         // Rounding must not darken a light that just reaches the point.
         if beyond.0 < self.cos_emission - 1e-4 {
             return 0.0;
         }
-        let mut importance = self.power * beyond.0.max(1e-3) / floor;
-        if let Some(n) = n {
-            let (cos, _) = subtract(with_sine(n.dot(wi).clamp(-1.0, 1.0)), seen);
-            if cos < -1e-4 {
-                return 0.0;
-            }
-            importance *= cos.max(1e-3);
-        }
-        importance
+        let importance = self.power * inverse_d2 * beyond.0.max(1e-3);
+        let Some(n) = n else { return importance };
+        let (cos, _) = subtract(with_sine(n.dot(wi).clamp(-1.0, 1.0)), seen);
+        if cos < -1e-4 { 0.0 } else { importance * cos.max(1e-3) }
     }
 }
 
@@ -172,8 +193,20 @@ impl Node {
 #[derive(Debug, Default)]
 pub struct LightTree {
     nodes: Vec<Node>,
-    /// By light: turns from the root (bit 0 first, 1 = second child); `None` for lights that are not in the tree.
-    paths: Vec<Option<u64>>,
+    /// By light: where it is; `None` for lights that are not in the tree.
+    places: Vec<Option<Place>>,
+    /// The lights from the first leaf to the last.
+    order: Vec<u32>,
+    /// Sum of the powers before each place of `order`, and of all.
+    sums: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Turns from the root: bit 0 first, 1 = second child.
+    path: u64,
+    /// In `order`.
+    index: u32,
 }
 
 /// Below this depth subtrees are halved by count, so that 64 turns suffice for 2³² lights.
@@ -186,7 +219,8 @@ impl LightTree {
     pub fn new(lights: &[Light]) -> LightTree {
         let mut items: Vec<(u32, Bounds)> =
             lights.iter().enumerate().filter_map(|(i, l)| Some((i as u32, Bounds::of(l)?))).collect();
-        let mut tree = LightTree { nodes: Vec::new(), paths: vec![None; lights.len()] };
+        let mut tree =
+            LightTree { nodes: Vec::new(), places: vec![None; lights.len()], order: Vec::new(), sums: vec![0.0] };
         if !items.is_empty() {
             tree.nodes.reserve(2 * items.len());
             tree.build(&mut items, 0, 0);
@@ -202,21 +236,61 @@ impl LightTree {
     fn build(&mut self, items: &mut [(u32, Bounds)], path: u64, depth: u32) -> Bounds {
         let index = self.nodes.len();
         if let [(light, bounds)] = items {
-            self.nodes.push(Node::new(bounds, Link::Leaf(*light)));
-            self.paths[*light as usize] = Some(path);
+            let place = self.order.len();
+            self.nodes.push(Node::new(bounds, Link::Leaf(*light), place..place + 1));
+            self.places[*light as usize] = Some(Place { path, index: place as u32 });
+            self.order.push(*light);
+            self.sums.push(self.sums[place] + f64::from(bounds.power));
             return *bounds;
         }
         let middle = split(items, depth);
         let (first, second) = items.split_at_mut(middle);
         // Filled in when the children are known.
-        let placeholder = Node::new(&first[0].1, Link::Leaf(0));
+        let begin = self.order.len();
+        let placeholder = Node::new(&first[0].1, Link::Leaf(0), 0..0);
         self.nodes.push(placeholder);
         let a = self.build(first, path, depth + 1);
         let link = Link::Inner(self.nodes.len() as u32);
         let b = self.build(second, path | 1 << depth, depth + 1);
         let bounds = a.union(b);
-        self.nodes[index] = Node::new(&bounds, link);
+        self.nodes[index] = Node::new(&bounds, link, begin..self.order.len());
         bounds
+    }
+
+    /// Probability of the light at `place` of the order among those of `node`, by power.
+    fn share_by_power(&self, node: &Node, place: usize) -> f32 {
+        let total = self.sums[node.end as usize] - self.sums[node.begin as usize];
+        ((self.sums[place + 1] - self.sums[place]) / total) as f32
+    }
+
+    /// Place of the light of `node` that `u` in [0, 1) chooses by power.
+    fn place_by_power(&self, node: &Node, u: f64) -> usize {
+        let (begin, end) = (node.begin as usize, node.end as usize);
+        let target = self.sums[begin] + u * (self.sums[end] - self.sums[begin]);
+        // Triangles of one emitter are often alike, so that the search begins next to its end.
+        let guess = (begin + (u * (end - begin) as f64) as usize).min(end - 1);
+        let (mut low, mut high) = (begin, end);
+        let mut step = 1;
+        if self.sums[guess] <= target {
+            low = guess;
+            while low + step < end && self.sums[low + step] <= target {
+                low += step;
+                step *= 2;
+            }
+            high = (low + step).min(end);
+        } else {
+            high = high.min(guess);
+            while high > begin + step && self.sums[high - step] > target {
+                high -= step;
+                step *= 2;
+            }
+            low = low.max(high.saturating_sub(step));
+        }
+        while high - low > 1 {
+            let mid = (low + high) / 2;
+            if self.sums[mid] <= target { low = mid } else { high = mid }
+        }
+        low
     }
 
     /// Probability of the second child.
@@ -234,8 +308,13 @@ impl LightTree {
         let mut pmf = 1.0;
         let mut u = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON));
         loop {
-            match self.nodes.get(at)?.link {
+            let node = self.nodes.get(at)?;
+            match node.link {
                 Link::Leaf(light) => return Some((light, Pmf(pmf))),
+                Link::Inner(_) if node.is_one_from(p) => {
+                    let place = self.place_by_power(node, u);
+                    return Some((self.order[place], Pmf(pmf * self.share_by_power(node, place))));
+                }
                 Link::Inner(second) => {
                     let share = self.second_share(at + 1, second as usize, p, n);
                     let first_share = 1.0 - share;
@@ -257,11 +336,15 @@ impl LightTree {
 
     /// Probability with which [`LightTree::sample`] draws `light`.
     pub fn pmf(&self, p: Vec3, n: Option<Vec3>, light: u32) -> Pmf {
-        let Some(Some(mut path)) = self.paths.get(light as usize).copied() else {
+        let Some(Some(Place { mut path, index })) = self.places.get(light as usize).copied() else {
             return Pmf(0.0);
         };
         let (mut at, mut pmf) = (0, 1.0);
         while let Link::Inner(second) = self.nodes[at].link {
+            let node = &self.nodes[at];
+            if node.is_one_from(p) {
+                return Pmf(pmf * self.share_by_power(node, index as usize));
+            }
             let share = self.second_share(at + 1, second as usize, p, n);
             if path & 1 == 0 {
                 pmf *= 1.0 - share;

@@ -128,7 +128,7 @@ impl LightSet {
     }
 
     /// Chooses a light for the point `p`: the choice for direct light. `n` is the unit geometric normal on the side where light is
-    /// received; lights wholly below its horizon get no probability. `None` if light counts from both sides, or in a volume.
+    /// received; sets of lights wholly below its horizon get no probability. `None` if light counts from both sides, or in a volume.
     ///
     /// The probability is exactly [`LightSet::pmf_from`] with the same `p` and `n`. `None` is returned only if no light has power.
     #[inline]

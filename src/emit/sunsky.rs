@@ -9,6 +9,7 @@ use super::orientation::Orientation;
 use super::sun_table::{FIRST, NODES, RADIANCE, STEP};
 use super::{EmitError, in_range};
 use crate::math::piecewise::PiecewiseBilinear;
+use crate::math::trig::atan2;
 use crate::math::{DMat4, DVec3, Frame, Rgb, SolidAnglePdf, Vec3};
 use hw_skymodel::rgb::{SkyParams, SkyState};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -198,9 +199,9 @@ impl SunSky {
         }
         let sun = self.sun.as_ref().filter(|sun| sun.contains(dir)).map_or(0.0, |sun| 1.0 / sun.solid_angle());
         let sky = self.sky.as_ref().map_or(0.0, |sky| {
-            let phi = local.y.atan2(local.x) / TAU;
-            let sin = local.x.hypot(local.y);
-            let theta = sin.atan2(local.z) / FRAC_PI_2;
+            let phi = atan2(local.y, local.x) / TAU;
+            let sin = (local.x * local.x + local.y * local.y).sqrt();
+            let theta = atan2(sin, local.z) / FRAC_PI_2;
             sky.density.pdf([phi - phi.floor(), theta]) / (PI * PI * sin.max(MIN_SIN))
         });
         SolidAnglePdf(self.sun_share * sun + (1.0 - self.sun_share) * sky)

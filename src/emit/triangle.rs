@@ -7,7 +7,7 @@ use super::sample::{DirectSample, EmissionSample, LightEnd};
 use super::spherical_triangle::SphericalTriangle;
 use crate::math::float::gamma;
 use crate::math::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere, square_to_triangle};
-use crate::math::{AreaPdf, DVec3, Frame, Rgb, SolidAnglePdf, Vec2, Vec3};
+use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -156,17 +156,6 @@ impl TriangleLight {
         SphericalTriangle::new(&self.v, from).filter(|t| t.solid_angle > MIN_SOLID_ANGLE)
     }
 
-    /// Barycentrics (b1, b2) of the point in the direction `d` from `from`, pulled onto the triangle where rounding left it.
-    fn barycentrics(&self, from: Vec3, d: DVec3) -> [f32; 2] {
-        let v = self.v.map(|p| p.as_dvec3() - from.as_dvec3());
-        let volume = [d.dot(v[1].cross(v[2])), d.dot(v[2].cross(v[0])), d.dot(v[0].cross(v[1]))];
-        // Signs agree inside, whichever way the triangle turns.
-        let sign = (volume[0] + volume[1] + volume[2]).signum();
-        let b = volume.map(|x| (x * sign).max(0.0));
-        let sum = b[0] + b[1] + b[2];
-        if sum > 0.0 { [(b[1] / sum) as f32, (b[2] / sum) as f32] } else { [1.0 / 3.0; 2] }
-    }
-
     /// See [`super::Light::sample_direct`].
     #[inline]
     pub fn sample_direct(&self, from: Vec3, u: [f32; 2]) -> Option<DirectSample> {
@@ -175,7 +164,7 @@ impl TriangleLight {
         }
         let spherical = self.spherical(from);
         let b = match &spherical {
-            Some(t) => self.barycentrics(from, t.sample(u.map(f64::from))?),
+            Some(t) => t.barycentrics(t.sample(u.map(f64::from))?),
             None => square_to_triangle(u),
         };
         let (p, error) = self.point(b);

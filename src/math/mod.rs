@@ -11,6 +11,7 @@ pub mod measure;
 pub mod piecewise;
 pub mod rgb;
 pub mod sampler;
+pub mod trig;
 pub mod warp;
 
 pub use frame::Frame;

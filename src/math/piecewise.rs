@@ -114,18 +114,144 @@ fn find_cell(cells: usize, target: f64, cdf: impl Fn(usize) -> f64) -> usize {
     low
 }
 
-/// A density on the unit square, bilinear between the nodes of a regular grid.
+/// Rows of cumulative sums over the same number of cells. A guide says for equal parts of the unit interval where to begin, so that a
+/// search touches one cache line of the guide and, mostly, one of the sums.
 ///
-/// v is drawn from the marginal, u from the conditional of that v, which interpolates the two rows' cumulative sums.
+/// Sums are single precision: their rounding moves the border between two cells by at most as much as the spacing of the numbers
+/// that choose.
+#[derive(Clone, Debug)]
+struct GuidedRows {
+    cells: usize,
+    /// Parts per row; a power of two, so that multiplying by it is exact.
+    parts: usize,
+    /// Per row, mass below each cell, from 0 to 1.
+    cdf: Vec<f32>,
+    /// Per row, the last cell that begins at or below the start of each part.
+    guide: Vec<u32>,
+}
+
+/// Cells per part of the guide.
+const CELLS_PER_PART: usize = 4;
+
+impl GuidedRows {
+    fn new(cells: usize, rows: usize) -> GuidedRows {
+        let parts = (cells / CELLS_PER_PART).next_power_of_two();
+        let (cdf, guide) = (Vec::with_capacity(rows * (cells + 1)), Vec::with_capacity(rows * (parts + 1)));
+        GuidedRows { cells, parts, cdf, guide }
+    }
+
+    /// Appends a row and returns its mass. A row without mass, which is never asked for, is even.
+    fn push(&mut self, mass: impl Fn(usize) -> f64) -> f64 {
+        let total: f64 = (0..self.cells).map(&mass).sum();
+        let start = self.cdf.len();
+        let mut sum = 0.0;
+        for i in 0..self.cells {
+            self.cdf.push(if total > 0.0 { sum / total } else { i as f64 / self.cells as f64 } as f32);
+            sum += mass(i);
+        }
+        self.cdf.push(1.0);
+        let row = &self.cdf[start..];
+        let mut i = 0;
+        for k in 0..=self.parts {
+            let at = k as f32 / self.parts as f32;
+            while i + 1 < self.cells && row[i + 1] <= at {
+                i += 1;
+            }
+            self.guide.push(i as u32);
+        }
+        total
+    }
+
+    /// The cell of `row` that holds `u` in [0, 1), and how far inside. A cell without mass holds nothing.
+    #[inline]
+    fn find(&self, row: usize, u: f32) -> (usize, f32) {
+        let guide = &self.guide[row * (self.parts + 1)..][..self.parts + 1];
+        let cdf = &self.cdf[row * (self.cells + 1)..][..self.cells + 1];
+        let part = ((u * self.parts as f32) as usize).min(self.parts - 1);
+        let (mut low, mut high) = (guide[part] as usize, guide[part + 1] as usize + 1);
+        while high - low > 1 {
+            let mid = (low + high) / 2;
+            if cdf[mid] <= u { low = mid } else { high = mid }
+        }
+        (low, (u - cdf[low]) / (cdf[low + 1] - cdf[low]))
+    }
+
+    /// What [`GuidedRows::find`] maps to a place `inside` a cell.
+    fn invert(&self, row: usize, cell: usize, inside: f32) -> f32 {
+        let k = row * (self.cells + 1) + cell;
+        self.cdf[k] + inside * (self.cdf[k + 1] - self.cdf[k])
+    }
+}
+
+/// Choice of a cell of a regular grid over the unit square: first its row, then its place in the row. Every cell gets a rectangle
+/// of the random numbers, so that stratified numbers give stratified cells.
+#[derive(Clone, Debug)]
+pub struct CellGrid {
+    rows: GuidedRows,
+    columns: GuidedRows,
+    total: f64,
+}
+
+impl CellGrid {
+    /// A grid of `cells` = [along u, along v] whose cell (i, j) has the mass `mass(i, j)` ≥ 0. `None` without mass.
+    pub fn new(cells: [usize; 2], mass: impl Fn(usize, usize) -> f64) -> Option<CellGrid> {
+        if cells[0] == 0 || cells[1] == 0 {
+            return None;
+        }
+        let mut columns = GuidedRows::new(cells[0], cells[1]);
+        let masses: Vec<f64> = (0..cells[1]).map(|j| columns.push(|i| mass(i, j))).collect();
+        let mut rows = GuidedRows::new(cells[1], 1);
+        let total = rows.push(|j| masses[j]);
+        (total > 0.0).then_some(CellGrid { rows, columns, total })
+    }
+
+    /// Sum of the masses.
+    pub fn total(&self) -> f64 {
+        self.total
+    }
+
+    /// A cell (i, j) and new random numbers for a place inside it.
+    #[inline]
+    pub fn choose(&self, xi: [f32; 2]) -> ([usize; 2], [f32; 2]) {
+        let [x, y] = xi.map(|x| x.clamp(0.0, ONE_MINUS_EPSILON));
+        let (j, y) = self.rows.find(0, y);
+        let (i, x) = self.columns.find(j, x);
+        ([i, j], [x, y])
+    }
+
+    /// The numbers from which [`CellGrid::choose`] makes `inside` in the cell (i, j).
+    pub fn invert(&self, [i, j]: [usize; 2], inside: [f32; 2]) -> [f32; 2] {
+        [self.columns.invert(j, i, inside[0]), self.rows.invert(0, j, inside[1])]
+    }
+}
+
+/// A place (s, t) in a cell with density in proportion to the bilinear interpolation of the values `w` at its corners (row by row).
+#[inline]
+pub fn sample_in_cell([a, b, c, d]: [f32; 4], xi: [f32; 2]) -> [f32; 2] {
+    let t = invert_linear_f32(a + b, c + d, xi[1]);
+    [invert_linear_f32(a + (c - a) * t, b + (d - b) * t, xi[0]), t]
+}
+
+/// [`invert_linear`] in single precision, for places inside of one cell.
+#[inline]
+fn invert_linear_f32(a: f32, b: f32, r: f32) -> f32 {
+    let sum = a + b;
+    if sum <= 0.0 || r <= 0.0 {
+        return r.max(0.0);
+    }
+    // Scaled so that squares neither overflow nor vanish.
+    let (a, b) = (a / sum, b / sum);
+    (r / (a + (a * a + r * (b * b - a * a)).max(0.0).sqrt())).min(1.0)
+}
+
+/// A density on the unit square, bilinear between the nodes of a regular grid: a cell is drawn by its mass, then a place inside it.
 #[derive(Clone, Debug)]
 pub struct PiecewiseBilinear {
-    /// Cells along u.
-    cells_u: usize,
     /// Values at the nodes, row by row, normalised to integral one.
     values: Vec<f32>,
-    /// Per row: mass below each node along u. In double precision: dark cells beside a bright one must keep their share.
-    row_cdf: Vec<f64>,
-    marginal: PiecewiseLinear,
+    cells: [usize; 2],
+    grid: CellGrid,
+    integral: f64,
 }
 
 impl PiecewiseBilinear {
@@ -136,74 +262,57 @@ impl PiecewiseBilinear {
         if !values.len().is_multiple_of(nodes_u) {
             return None;
         }
-        let integrals: Vec<f64> = values
-            .chunks_exact(nodes_u)
-            .map(|row| row.windows(2).map(|p| 0.5 * (clean(p[0]) + clean(p[1]))).sum::<f64>() / cells_u as f64)
-            .collect();
-        let marginal = PiecewiseLinear::from_f64(integrals)?;
-        let scale = 1.0 / marginal.integral();
-        let values: Vec<f32> = values.iter().map(|&v| (clean(v) * scale) as f32).collect();
-        let mut row_cdf = Vec::with_capacity(values.len());
-        for row in values.chunks_exact(nodes_u) {
-            let mut sum = 0.0;
-            row_cdf.push(0.0);
-            for p in row.windows(2) {
-                sum += 0.5 * (f64::from(p[0]) + f64::from(p[1])) / cells_u as f64;
-                row_cdf.push(sum);
-            }
-        }
-        Some(PiecewiseBilinear { cells_u, values, row_cdf, marginal })
+        let cells = [cells_u, (values.len() / nodes_u).checked_sub(1)?];
+        let at = |i: usize, j: usize| clean(values[j * nodes_u + i]);
+        let mass = |i, j| 0.25 * (at(i, j) + at(i + 1, j) + at(i, j + 1) + at(i + 1, j + 1));
+        let grid = CellGrid::new(cells, mass)?;
+        let integral = grid.total() / (cells[0] * cells[1]) as f64;
+        let values = values.iter().map(|&v| (clean(v) / integral) as f32).collect();
+        Some(PiecewiseBilinear { values, cells, grid, integral })
     }
 
     /// Integral of the function that was given.
     pub fn integral(&self) -> f64 {
-        self.marginal.integral()
+        self.integral
     }
 
-    fn cells_v(&self) -> usize {
-        self.marginal.values.len() - 1
-    }
-
-    /// Value at column `i`, interpolated between the rows j and j + 1.
-    fn column(&self, i: usize, j: usize, t: f64) -> f64 {
-        let k = j * (self.cells_u + 1) + i;
-        lerp(f64::from(self.values[k]), f64::from(self.values[k + self.cells_u + 1]), t)
-    }
-
-    /// Mass below column `i` of the row interpolated between j and j + 1.
-    fn mass(&self, i: usize, j: usize, t: f64) -> f64 {
-        let k = j * (self.cells_u + 1) + i;
-        lerp(self.row_cdf[k], self.row_cdf[k + self.cells_u + 1], t)
+    /// Values at the corners of a cell.
+    #[inline]
+    fn corners(&self, [i, j]: [usize; 2]) -> [f32; 4] {
+        let k = j * (self.cells[0] + 1) + i;
+        let below = k + self.cells[0] + 1;
+        [self.values[k], self.values[k + 1], self.values[below], self.values[below + 1]]
     }
 
     /// A point (u, v) of the unit square and its density.
     pub fn sample(&self, xi: [f32; 2]) -> ([f32; 2], f32) {
-        let (v, _) = self.marginal.sample(xi[1]);
-        let (j, t) = locate(v, self.cells_v());
-        let target = f64::from(xi[0].clamp(0.0, ONE_MINUS_EPSILON)) * self.mass(self.cells_u, j, t);
-        let i = find_cell(self.cells_u, target, |k| self.mass(k, j, t));
-        let (below, above) = (self.mass(i, j, t), self.mass(i + 1, j, t));
-        let r = if above > below { (target - below) / (above - below) } else { 0.5 };
-        let s = invert_linear(self.column(i, j, t), self.column(i + 1, j, t), r);
-        let u = ((i as f64 + s) / self.cells_u as f64) as f32;
-        ([u, v], self.pdf([u, v]))
+        let (cell, xi) = self.grid.choose(xi);
+        let place = sample_in_cell(self.corners(cell), xi);
+        let p = std::array::from_fn(|k| ((cell[k] as f64 + f64::from(place[k])) / self.cells[k] as f64) as f32);
+        (p, self.pdf(p))
+    }
+
+    /// The cell around `p` and the place inside it; coordinates outside are clamped.
+    #[inline]
+    fn place(&self, p: [f32; 2]) -> ([usize; 2], [f32; 2]) {
+        let ((i, s), (j, t)) = (locate(p[0], self.cells[0]), locate(p[1], self.cells[1]));
+        ([i, j], [s as f32, t as f32])
     }
 
     /// Density at `p` = (u, v) per unit area of the square; coordinates outside are clamped.
     pub fn pdf(&self, p: [f32; 2]) -> f32 {
-        let (i, s) = locate(p[0], self.cells_u);
-        let (j, t) = locate(p[1], self.cells_v());
-        lerp(self.column(i, j, t), self.column(i + 1, j, t), s) as f32
+        let (cell, [s, t]) = self.place(p);
+        let [a, b, c, d] = self.corners(cell);
+        let (top, bottom) = (a + (b - a) * s, c + (d - c) * s);
+        top + (bottom - top) * t
     }
 
     /// The numbers that [`PiecewiseBilinear::sample`] maps to `p`.
     pub fn invert(&self, p: [f32; 2]) -> [f32; 2] {
-        let (j, t) = locate(p[1], self.cells_v());
-        let (i, s) = locate(p[0], self.cells_u);
-        let inside = linear_cdf(self.column(i, j, t), self.column(i + 1, j, t), s);
-        let total = self.mass(self.cells_u, j, t);
-        let below = lerp(self.mass(i, j, t), self.mass(i + 1, j, t), inside);
-        [if total > 0.0 { (below / total) as f32 } else { p[0] }, self.marginal.cdf(p[1])]
+        let (cell, [s, t]) = self.place(p);
+        let ([a, b, c, d], [s, t]) = (self.corners(cell).map(f64::from), [f64::from(s), f64::from(t)]);
+        let inside = [linear_cdf(lerp(a, c, t), lerp(b, d, t), s), linear_cdf(a + b, c + d, t)];
+        self.grid.invert(cell, inside.map(|x| x as f32))
     }
 }
 
@@ -239,8 +348,44 @@ mod tests {
             let back = d.invert(p);
             prop_assert!((back[1] - y).abs() < 1e-4, "{back:?} {x} {y}");
             // Where the marginal vanishes the conditional is undefined.
-            prop_assume!(d.marginal.pdf(p[1]) > 1e-3);
+            let (cell, [_, t]) = d.place(p);
+            let [a, b, c, e] = d.corners(cell);
+            prop_assume!((a + b) * (1.0 - t) + (c + e) * t > 1e-3);
             prop_assert!((back[0] - x).abs() < 1e-2, "{back:?} {x} {y}");
+        }
+    }
+
+    /// A sun that outshines all else, rows and cells without mass, and more cells than parts of the guide.
+    #[test]
+    fn cells_are_chosen_by_their_mass() {
+        let mass = |i: usize, j: usize| match (i, j) {
+            (17, 3) => 300.0,
+            (_, 5) | (0 | 99, _) => 0.0,
+            _ => ((i * 7 + j * 3) % 5) as f64,
+        };
+        let grid = CellGrid::new([100, 7], mass).unwrap();
+        let (nu, nv) = (2000u32, 200u32);
+        let mut count = vec![0u32; 700];
+        for k in 0..nu * nv {
+            let xi = [((k % nu) as f32 + 0.5) / nu as f32, ((k / nu) as f32 + 0.5) / nv as f32];
+            let (cell, inside) = grid.choose(xi);
+            assert!(inside.iter().all(|x| (0.0..=1.0).contains(x)));
+            let back = grid.invert(cell, inside);
+            assert!((back[0] - xi[0]).abs() < 1e-6 && (back[1] - xi[1]).abs() < 1e-6, "{xi:?} {back:?}");
+            count[cell[1] * 100 + cell[0]] += 1;
+        }
+        for (k, &n) in count.iter().enumerate() {
+            let (i, j) = (k % 100, k / 100);
+            let row: f64 = (0..100).map(|i| mass(i, j)).sum();
+            // A cell is a rectangle of random numbers: its count is off by at most one grid line on either side.
+            let (width, height) = (mass(i, j) / row.max(1e-9) * f64::from(nu), row / grid.total() * f64::from(nv));
+            let slack = width + height + 1.0;
+            assert!((f64::from(n) - width * height).abs() <= slack, "{i} {j}: {n}, {}", width * height);
+            assert!(mass(i, j) > 0.0 || n == 0);
+        }
+        for u in [0.0, ONE_MINUS_EPSILON] {
+            let ([i, j], _) = grid.choose([u, u]);
+            assert!(mass(i, j) > 0.0);
         }
     }
 

@@ -207,8 +207,13 @@ impl Bitmap {
     }
 
     /// Texel coordinate → index, beyond the edges as the wrap mode says.
+    #[inline]
     fn wrapped(&self, i: i64, size: u32) -> usize {
         let n = i64::from(size);
+        // Most look-ups are inside, and a remainder is as slow as a cache miss.
+        if (0..n).contains(&i) {
+            return i as usize;
+        }
         let i = match self.wrap {
             WrapMode::Repeat => i.rem_euclid(n),
             WrapMode::Clamp => i.clamp(0, n - 1),

@@ -1,6 +1,7 @@
 //! Choosing lights.
 
 use super::*;
+use std::f32::consts::PI;
 
 fn many_lights() -> Vec<Light> {
     let mut rng = rng(80);
@@ -43,9 +44,27 @@ fn places() -> Vec<(Vec3, Option<Vec3>)> {
     places
 }
 
+/// Two finely tessellated emitters, one round and one flat, of unlike triangles: from most places parts of them count as one light.
+fn tessellated() -> LightSet {
+    let (n, mut lights) = (24, Vec::new());
+    for k in 0..n * n {
+        let at = |i: usize, j: usize| {
+            let (theta, phi) = (PI * i as f32 / n as f32, 2.0 * PI * j as f32 / n as f32);
+            Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()) * 0.5
+        };
+        let plane = |i: usize, j: usize| Vec3::new((i * i) as f32 * 0.001, j as f32 * 0.01, 2.0);
+        let (i, j) = (k / n, k % n);
+        for v in [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [plane(i, j), plane(i, j + 1), plane(i + 1, j)]] {
+            let radiance = Rgb::grey(1.0 + (k % 3) as f32);
+            lights.push(Light::Triangle(TriangleLight::new(v, false, TriangleEmission::Constant(radiance))));
+        }
+    }
+    LightSet::new(lights)
+}
+
 #[test]
 fn probabilities_sum_to_one_and_match_the_choices() {
-    let sets = [LightSet::new(many_lights()), with_infinite()];
+    let sets = [LightSet::new(many_lights()), with_infinite(), tessellated()];
     let alpha = significance(2 * (sets.len() * places().len()) as u32);
     for (k, set) in sets.iter().enumerate() {
         for (j, (p, n)) in places().into_iter().enumerate() {
