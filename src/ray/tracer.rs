@@ -3,7 +3,7 @@
 //! Every query would cost more in clock reads than it may, so one call in a prime number is timed and the mean stands for the rest;
 //! the clock's own cost, measured once, is taken off.
 
-use super::{Hit, PACKET, Ray, RayQuery, SegmentPacket};
+use super::{Hit, PACKET, Phases, Ray, RayQuery, SegmentPacket};
 use std::sync::LazyLock;
 use std::time::Instant;
 
@@ -38,6 +38,11 @@ impl RayKind {
         RayKind::ShadowLens,
         RayKind::ShadowConnection,
     ];
+
+    /// It asks only whether something is in the way.
+    pub fn is_shadow(self) -> bool {
+        matches!(self, RayKind::ShadowDirect | RayKind::ShadowLens | RayKind::ShadowConnection)
+    }
 
     /// Name in statistics.
     pub fn name(self) -> &'static str {
@@ -99,6 +104,8 @@ pub struct RayStats {
     pub kinds: [KindStats; KINDS],
     /// Rays with a component that is not finite; they were not traced.
     pub invalid: u64,
+    /// Wall seconds by phase.
+    pub phases: Phases,
 }
 
 impl RayStats {
@@ -112,6 +119,7 @@ impl RayStats {
             a.timed_ns += b.timed_ns;
         }
         self.invalid += o.invalid;
+        self.phases.merge(&o.phases);
     }
 
     /// All rays.
