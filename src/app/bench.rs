@@ -46,10 +46,10 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     stage.say(&measured.load.sentence());
     if let Some(path) = &args.save {
         let text = to_json(&measured)?;
-        atomic_write(path, |w| writeln!(w, "{text}"))
-            .map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+        atomic_write(path, |w| writeln!(w, "{text}")).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
     }
-    let worse = verdicts.iter().flatten().filter(|v| v.time.regression || v.error.is_some_and(|e| e.regression)).count();
+    let worse =
+        verdicts.iter().flatten().filter(|v| v.time.regression || v.error.is_some_and(|e| e.regression)).count();
     match (verdicts, worse) {
         (Some(v), _) if v.is_empty() => {
             Err(Failure::Input("the baseline has none of these scenes and methods: nothing was compared".into()))

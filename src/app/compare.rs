@@ -3,7 +3,7 @@
 use super::Failure;
 use super::cli::CompareArgs;
 use crate::image::error_image::{DECADES, ErrorView, error_image};
-use crate::image::metrics::colours;
+use crate::image::metrics::{Colours, colours};
 use crate::image::z_test::{ZTest, z_test};
 use crate::image::{
     Encoding, ExrFile, Image, ImageError, ImageFault, Layer, OutputFormat, Picture, Report, compare, read_image,
@@ -22,7 +22,7 @@ struct Answer {
 }
 
 /// A picture, and the variance of its pixels where a layer tells.
-fn read(path: &Path) -> Result<(Image, Option<Vec<[f64; 3]>>), Failure> {
+fn read(path: &Path) -> Result<(Image, Option<Colours>), Failure> {
     let fault = |e: ImageError| match e.fault {
         ImageFault::Io(_) => Failure::io(&e),
         _ => Failure::input(&e),

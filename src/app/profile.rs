@@ -27,8 +27,7 @@ pub(crate) fn run(args: &ProfileArgs) -> Result<(), Failure> {
         time: args.time,
         threads: stage.threads,
     };
-    let (found, film, map) =
-        stage.pool.install(|| profile(&mut set.scene, &task)).map_err(Failure::input)?;
+    let (found, film, map) = stage.pool.install(|| profile(&mut set.scene, &task)).map_err(Failure::input)?;
     let tables = tables(&found);
     if args.measure.json {
         out!("{}", to_json(&found)?);
@@ -98,7 +97,8 @@ fn tables(p: &Profile) -> Vec<Table> {
             k.blocked.map_or(String::new(), percent),
         ]);
     }
-    let mut replay = Table::new(["the same rays through the bare backend", "ns each", "share of the renderer's time", "met"]);
+    let mut replay =
+        Table::new(["the same rays through the bare backend", "ns each", "share of the renderer's time", "met"]);
     for r in &p.replay {
         replay.row([r.backend.clone(), format!("{:.0}", r.ns_per_ray), percent(r.share), r.met.to_string()]);
     }
@@ -123,10 +123,10 @@ fn page(p: &Profile, tables: &[Table], picture: &[[f64; 3]], map: &CostMap) -> S
     page.markup(&picture_group(p.size, &[plain("picture", picture, "")], None));
     page.heading(2, "Cost and visibility");
     page.text(&format!(
-        "One sample in every {}th column and row, run again and counted. Cost: rays relative to the mean pixel ({:.1} rays), here at half of \
+        "{} samples of a pixel in every {}th column and row, run again and counted. Cost: rays relative to the mean pixel ({:.1} rays), here at half of \
          their value. Blocked: the share of a pixel's shadow rays with something in the way, and the light that they would have brought \
          relative to all light.",
-        map.step, p.wasted.rays_per_sample
+        map.samples, map.step, p.wasted.rays_per_sample
     ));
     let half: Vec<[f64; 3]> = doubles(&map.cost_picture()).iter().map(|p| p.map(|v| 0.5 * v)).collect();
     let (blocked, light) = (doubles(&map.blocked_picture()), doubles(&map.lost_light_picture()));

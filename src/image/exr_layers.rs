@@ -97,7 +97,8 @@ fn decode(bytes: &[u8]) -> Result<ExrFile, ImageFault> {
     }
     use e::ReadChannels;
     use e::ReadLayers;
-    let reader = e::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let reader =
+        e::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let image = reader.from_buffered(Cursor::new(bytes)).map_err(fault)?;
     let layer = image.layer_data;
     // Attributes of the program's own are the layer's, whatever reads them.
@@ -112,7 +113,6 @@ fn decode(bytes: &[u8]) -> Result<ExrFile, ImageFault> {
     metadata.dedup();
     let prefix = layer.attributes.layer_name.as_ref().map_or(String::new(), |n| format!("{n}."));
     let channels = layer.channel_data.list.iter();
-    let channels =
-        channels.map(|c| (format!("{prefix}{}", c.name), c.sample_data.values_as_f32().collect())).collect();
+    let channels = channels.map(|c| (format!("{prefix}{}", c.name), c.sample_data.values_as_f32().collect())).collect();
     Ok(ExrFile { width: layer.size.width() as u32, height: layer.size.height() as u32, channels, metadata })
 }

@@ -71,7 +71,8 @@ pub fn merge(files: &[(String, ExrFile)]) -> Result<Picture, MergeError> {
             return Err(MergeError::Differs { file: name.clone(), what, found, expected });
         }
         let iterations = header("iterations")?.parse().ok().filter(|n| *n > 0);
-        let iterations = iterations.ok_or(MergeError::Header { file: name.clone(), what: "how many iterations it has" })?;
+        let iterations =
+            iterations.ok_or(MergeError::Header { file: name.clone(), what: "how many iterations it has" })?;
         for seed in header("seed")?.split_whitespace() {
             if !seeds.insert(seed.to_owned()) {
                 return Err(MergeError::Seed { file: name.clone(), seed: seed.into() });

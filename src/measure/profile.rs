@@ -1,8 +1,8 @@
 //! Where the time of one method goes: its phases, its rays, and how much of it bare backends need for the very same rays.
 
+use super::machine::{Load, cpu_time};
 use super::recorder::Recorder;
 use super::visibility::{CostMap, Wasted, cost_map};
-use super::machine::{Load, cpu_time};
 use super::{Contender, LoadWatch, Machine};
 use crate::film::Film;
 use crate::integrators::{Integrator, Iteration};

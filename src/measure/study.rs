@@ -148,7 +148,12 @@ impl SceneStudy {
     pub fn show(&self, page: &mut Page, reference: &Reference) {
         page.heading(2, &self.scene);
         let [width, height] = self.size;
-        page.text(&format!("{}: {width} x {height} pixels, {} triangles; {}.", self.file, self.triangles, self.load.sentence()));
+        page.text(&format!(
+            "{}: {width} x {height} pixels, {} triangles; {}.",
+            self.file,
+            self.triangles,
+            self.load.sentence()
+        ));
         page.text(&format!("{}.", self.reference.sentence()));
         let of_method = |method: &Method| runs_of(&self.runs, &method.label).into_iter().next();
         let mut shown: Vec<Shown> = self

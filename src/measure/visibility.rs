@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
-/// Counts of one sample of one pixel.
+/// Counts of samples of one pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelCost {
     /// Rays: edges of both sub-paths and shadow rays.
@@ -26,7 +26,9 @@ pub struct CostMap {
     pub step: u32,
     /// Width and height.
     pub size: [u32; 2],
-    /// Row by row.
+    /// Samples of each pixel that were looked at.
+    pub samples: u32,
+    /// Sums over these, row by row.
     pub pixels: Vec<PixelCost>,
 }
 
@@ -42,6 +44,18 @@ pub struct Wasted {
     /// Share of the light that they would have brought.
     pub blocked_light: f64,
 }
+
+impl PixelCost {
+    fn add(&mut self, o: &PixelCost) {
+        self.rays += o.rays;
+        for (a, b) in self.shadow.iter_mut().chain(&mut self.light).zip(o.shadow.iter().chain(&o.light)) {
+            *a += b;
+        }
+    }
+}
+
+/// Samples of a pixel that a map is to have, about.
+const PASSES: f64 = 8.0;
 
 fn count(replay: &Replay) -> PixelCost {
     let mut cost = PixelCost { rays: (replay.eye.len() + replay.light.len()) as f32, ..PixelCost::default() };
@@ -60,36 +74,40 @@ fn count(replay: &Replay) -> PixelCost {
     cost
 }
 
-/// Runs one sample of every pixel, or of as many as fit into about `time`. On the current thread pool.
+/// Runs samples of every pixel, or of as many pixels as leave time for [`PASSES`] samples of each, for about `time`. On the current thread
+/// pool.
 pub fn cost_map(scene: &PreparedScene, method: &Contender, seed: u64, time: Duration) -> CostMap {
     let [x0, y0, width, height] = scene.window;
-    let map = |step: u32| {
+    let pass = |step: u32, index: u64| -> Vec<PixelCost> {
         let size = [width.div_ceil(step), height.div_ceil(step)];
-        let pixels = (0..size[0] * size[1])
+        (0..size[0] * size[1])
             .into_par_iter()
             .map_init(
                 || (method.spec.build)(&method.params),
                 |integrator, i| {
                     let (x, y) = (i % size[0] * step + step / 2, i / size[0] * step + step / 2);
                     let pixel = (x0 + x.min(width - 1), y0 + y.min(height - 1));
-                    count(&integrator.replay(&Iteration { scene, seed, index: 0 }, pixel))
+                    count(&integrator.replay(&Iteration { scene, seed, index }, pixel))
                 },
             )
-            .collect();
-        CostMap { step, size, pixels }
+            .collect()
     };
     // A coarse map tells how long a fine one takes.
     let start = Instant::now();
     let mut step = (((f64::from(width) * f64::from(height)) / 256.0).sqrt().ceil() as u32).max(1);
-    let mut best = map(step);
-    let seconds = start.elapsed().as_secs_f64();
-    let affordable = (time.as_secs_f64() / seconds.max(1e-6)).sqrt();
+    let mut pixels = pass(step, 0);
+    let affordable = (time.as_secs_f64() / PASSES / start.elapsed().as_secs_f64().max(1e-6)).sqrt();
     let finer = (f64::from(step) / affordable.max(1.0)).ceil().max(1.0) as u32;
     if finer < step {
         step = finer;
-        best = map(step);
+        pixels = pass(step, 0);
     }
-    best
+    let mut samples = 1;
+    while start.elapsed().mul_f64(f64::from(samples + 1) / f64::from(samples)) < time {
+        pixels.iter_mut().zip(pass(step, samples.into())).for_each(|(sum, more)| sum.add(&more));
+        samples += 1;
+    }
+    CostMap { step, size: [width.div_ceil(step), height.div_ceil(step)], samples, pixels }
 }
 
 impl CostMap {
@@ -115,8 +133,8 @@ impl CostMap {
         let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
         let (arrived, blocked) = (sum(|p| p.light[0]), sum(|p| p.light[1]));
         Wasted {
-            samples: self.pixels.len(),
-            rays_per_sample: share(sum(|p| p.rays), self.pixels.len() as f64),
+            samples: self.pixels.len() * self.samples as usize,
+            rays_per_sample: share(sum(|p| p.rays), self.pixels.len() as f64 * f64::from(self.samples)),
             blocked_contributions: share(sum(|p| p.shadow[1]), sum(|p| p.shadow[0])),
             blocked_light: share(blocked, arrived + blocked),
         }

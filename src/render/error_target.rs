@@ -15,20 +15,22 @@ use crate::math::hash::mix64;
 use crate::prepared::PreparedScene;
 use crate::ray::RayStats;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+
+/// A measure's place among all.
+type Of = fn(&PixelErrors) -> f64;
 
 /// When the error is small enough.
 #[derive(Clone, Copy, Debug)]
 pub struct ErrorTarget {
     /// Name of the measure.
     pub key: &'static str,
-    of: fn(&PixelErrors) -> f64,
+    of: Of,
     /// The error to get below.
     pub value: f64,
 }
 
 /// What can be estimated.
-const KEYS: [(&str, fn(&PixelErrors) -> f64); 6] = [
+const KEYS: [(&str, Of); 6] = [
     ("relmse", |e| e.relmse),
     ("relmse_trimmed", |e| e.relmse_trimmed),
     ("mape", |e| e.mape),
@@ -39,8 +41,10 @@ const KEYS: [(&str, fn(&PixelErrors) -> f64); 6] = [
 
 /// Iterations before the first look: fewer tell nothing.
 const FIRST_LOOK: u64 = 8;
-/// Looking may take this share of the time.
-const LOOKING: f64 = 0.01;
+/// Iterations between two looks, at least and as a part of those so far. Looking costs a small part of an iteration, so that this keeps
+/// it well below a hundredth of the time; a rule that looked at the clock would stop elsewhere each time.
+const LOOK_AFTER: u64 = 4;
+const LOOK_PART: u64 = 8;
 
 impl ErrorTarget {
     /// Reads `relmse=0.01`.
@@ -49,7 +53,8 @@ impl ErrorTarget {
     /// What was expected.
     pub fn parse(text: &str) -> Result<ErrorTarget, String> {
         let known = || KEYS.map(|k| k.0).join(", ");
-        let (name, value) = text.split_once('=').ok_or_else(|| format!("expected MEASURE=VALUE, one of {}", known()))?;
+        let (name, value) =
+            text.split_once('=').ok_or_else(|| format!("expected MEASURE=VALUE, one of {}", known()))?;
         let found = KEYS.into_iter().find(|k| k.0 == name);
         let (key, of) = found.ok_or_else(|| format!("unknown measure \"{name}\"; known: {}", known()))?;
         let value = value.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite());
@@ -58,14 +63,14 @@ impl ErrorTarget {
 
     /// The estimate from two halves.
     pub fn estimate(&self, halves: &[Film; 2]) -> f64 {
-        let mut mean: Vec<[f64; 3]> = vec![];
         let pictures = halves.each_ref().map(|film| {
             let mut out = vec![[0.0; 3]; film.width as usize * film.height as usize];
             let scale = 1.0 / film.iterations.max(1) as f64;
             film.for_each_pixel(|x, y, sum, _| out[(y * film.width + x) as usize] = sum.map(|s| s * scale));
             out
         });
-        mean.extend(pictures[0].iter().zip(&pictures[1]).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))));
+        let both = pictures[0].iter().zip(&pictures[1]);
+        let mean: Vec<[f64; 3]> = both.map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
         (self.of)(&pixel_errors(&pictures[0], &mean))
     }
 }
@@ -89,19 +94,14 @@ pub fn render_to_target(
     let mut integrators = [build(), build()];
     let seeds = seeds(seed);
     let (mut clock, mut rays, mut estimate) = (Clock::default(), RayStats::default(), None);
-    let (cpu_before, mut next_look, mut looked) = (cpu_seconds(), FIRST_LOOK, 0.0);
+    let (cpu_before, mut next_look) = (cpu_seconds(), FIRST_LOOK);
     let stop = loop {
         let n = film.iterations;
         // Halves of equal size only: both seeds have had their turn.
         if n >= next_look && n.is_multiple_of(2) {
-            let start = Instant::now();
             let found = clock.time(|| target.estimate(&halves));
             estimate = Some(found);
-            looked += start.elapsed().as_secs_f64();
-            // A tenth more samples before the next look, and more if looking is dear.
-            let per_iteration = clock.total().as_secs_f64() / n as f64;
-            let rest = looked / LOOKING - clock.total().as_secs_f64();
-            next_look = n + (n / 10).max((rest / per_iteration) as u64).max(2);
+            next_look = n + (n / LOOK_PART).max(LOOK_AFTER);
             if found < target.value {
                 break Stop::Converged;
             }

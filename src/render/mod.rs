@@ -10,7 +10,7 @@ pub mod stats;
 
 pub use aov::Aov;
 pub use checkpoint::{Checkpoint, CheckpointError};
-pub use scene_hash::scene_hash;
 pub use driver::{Budget, Outcome, Progress, Stop, render};
 pub use error_target::{ErrorTarget, render_to_target};
+pub use scene_hash::scene_hash;
 pub use stats::RenderStats;

@@ -34,9 +34,8 @@ pub fn picture_group([width, height]: [u32; 2], pictures: &[Shown], reference: O
     );
     for (i, p) in pictures.iter().enumerate() {
         assert_eq!(p.pixels.len(), width as usize * height as usize, "{}", p.name);
-        let errors = reference.map_or(String::new(), |r| {
-            encode::errors(p.pixels.iter().zip(r).map(|(a, b)| relative_error(a, b)))
-        });
+        let errors = reference
+            .map_or(String::new(), |r| encode::errors(p.pixels.iter().zip(r).map(|(a, b)| relative_error(a, b))));
         let _ = write!(
             data,
             "{}{{\"name\":{},\"note\":{},\"pixels\":\"{}\",\"errors\":\"{errors}\"}}",
@@ -61,7 +60,7 @@ pub fn picture_group([width, height]: [u32; 2], pictures: &[Shown], reference: O
 fn scale_bytes() -> Vec<u8> {
     let byte = |v: f32| (crate::image::buffer::linear_to_srgb(f64::from(v)) * 255.0).round() as u8;
     let colour = |i: usize| scale_colour(i as f64 / (SCALE_STEPS - 1) as f64);
-    (0..SCALE_STEPS).flat_map(|i| <[f32; 3]>::from(colour(i).to_array()).map(byte)).collect()
+    (0..SCALE_STEPS).flat_map(|i| colour(i).to_array().map(byte)).collect()
 }
 
 /// Colours as the viewer wants them.

@@ -88,10 +88,7 @@ impl Plot {
         let (left, right) = (MARGIN[0], width - MARGIN[2]);
         let (top, base) = (MARGIN[1], bottom - MARGIN[3]);
         let heights = all().flat_map(|p| p[1..].iter().copied());
-        let (Some(x), Some(y)) = (
-            Axis::new(all().map(|p| p[0]), left, right),
-            Axis::new(heights, base, top),
-        ) else {
+        let (Some(x), Some(y)) = (Axis::new(all().map(|p| p[0]), left, right), Axis::new(heights, base, top)) else {
             return format!("<p>{}: nothing to plot</p>", escape(&self.title));
         };
         let height = bottom + LEGEND_LINE * (self.lines.len() + 1) as f64;
@@ -104,14 +101,25 @@ impl Plot {
             let at = x.at(value);
             let _ = write!(out, "<path class=\"grid\" d=\"M{at:.1} {top}V{base}\"/>");
             if named {
-                let _ = write!(out, "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>", base + 15.0, label(value));
+                let _ = write!(
+                    out,
+                    "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+                    base + 15.0,
+                    label(value)
+                );
             }
         }
         for (value, named) in y.ticks() {
             let at = y.at(value);
             let _ = write!(out, "<path class=\"grid\" d=\"M{left} {at:.1}H{right}\"/>");
             if named {
-                let _ = write!(out, "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>", left - 5.0, at + 4.0, label(value));
+                let _ = write!(
+                    out,
+                    "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                    left - 5.0,
+                    at + 4.0,
+                    label(value)
+                );
             }
         }
         let _ = write!(
