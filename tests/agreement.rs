@@ -61,7 +61,7 @@ fn every_integrator_agrees_with_the_path_tracer() {
                 if heuristic == "power" && spec.params.iter().all(|p| p.name != "heuristic") {
                     continue;
                 }
-                let picture = Picture::render(spec, &scene, &[("heuristic", heuristic)], SPP, 200);
+                let picture = Picture::render(spec, &scene, &[("heuristic", heuristic)], SPP, 250);
                 picture.assert_agrees(&reference, 0.0, &format!("{} ({heuristic}): {name}", spec.name));
             }
         }

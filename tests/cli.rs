@@ -267,21 +267,28 @@ fn pictures_are_compared() {
     sandbox.run("compare small.pfm a.pfm").expect(2, &["8 x 8", "16 x 16"]);
 }
 
+/// Every integrator of the program.
+fn integrators() -> impl Iterator<Item = &'static str> {
+    lightsieve::integrators::REGISTRY.iter().map(|s| s.name)
+}
+
 #[test]
 fn same_seed_same_bits_for_any_number_of_threads() {
     let sandbox = Sandbox::new();
-    // Several tiles, the last ones narrow.
-    for threads in [1, 2, 7] {
-        render(
-            &sandbox,
-            &format!("-o {threads}.pfm -o {threads}.exr --size 40x24 --spp 3 --seed 5 --threads {threads}"),
-        );
+    for i in integrators() {
+        // Several tiles, the last ones narrow.
+        for threads in [1, 2, 7] {
+            render(
+                &sandbox,
+                &format!("-i {i} -o {threads}.pfm -o {threads}.exr --size 40x24 --spp 3 --seed 5 --threads {threads}"),
+            );
+        }
+        for threads in [2, 7] {
+            assert_eq!(sandbox.read("1.pfm"), sandbox.read(&format!("{threads}.pfm")), "{i}, {threads} threads");
+        }
+        render(&sandbox, &format!("-i {i} -o other.pfm --size 40x24 --spp 3 --seed 6"));
+        assert_ne!(sandbox.read("1.pfm"), sandbox.read("other.pfm"));
     }
-    for threads in [2, 7] {
-        assert_eq!(sandbox.read("1.pfm"), sandbox.read(&format!("{threads}.pfm")), "{threads} threads");
-    }
-    render(&sandbox, "-o other.pfm --size 40x24 --spp 3 --seed 6");
-    assert_ne!(sandbox.read("1.pfm"), sandbox.read("other.pfm"));
 }
 
 #[test]
@@ -299,15 +306,18 @@ fn both_backends_make_the_same_picture() {
 #[test]
 fn a_resumed_render_has_the_same_bits() {
     let sandbox = Sandbox::new();
-    render(&sandbox, "-o whole.pfm --spp 8 --size 20x18");
-    render(&sandbox, "-o half.pfm --spp 4 --size 20x18 --checkpoint c");
-    assert_ne!(sandbox.read("half.pfm"), sandbox.read("whole.pfm"));
-    render(&sandbox, "-o resumed.pfm --spp 8 --size 20x18 --resume c --checkpoint d --threads 1 --stats s.json");
-    assert_eq!(sandbox.read("resumed.pfm"), sandbox.read("whole.pfm"));
-    assert_eq!(stats(&sandbox, "s.json")["iterations"], 8);
-    // All is done: nothing is traced, the picture is written.
-    render(&sandbox, "-o done.pfm --spp 8 --size 20x18 --resume d");
-    assert_eq!(sandbox.read("done.pfm"), sandbox.read("whole.pfm"));
+    for i in integrators() {
+        let render = |arguments: &str| render(&sandbox, &format!("-i {i} --size 20x18 {arguments}"));
+        render("-o whole.pfm --spp 8");
+        render("-o half.pfm --spp 4 --checkpoint c");
+        assert_ne!(sandbox.read("half.pfm"), sandbox.read("whole.pfm"), "{i}");
+        render("-o resumed.pfm --spp 8 --resume c --checkpoint d --threads 1 --stats s.json");
+        assert_eq!(sandbox.read("resumed.pfm"), sandbox.read("whole.pfm"), "{i}");
+        assert_eq!(stats(&sandbox, "s.json")["iterations"], 8);
+        // All is done: nothing is traced, the picture is written.
+        render("-o done.pfm --spp 8 --resume d");
+        assert_eq!(sandbox.read("done.pfm"), sandbox.read("whole.pfm"), "{i}");
+    }
 }
 
 #[test]
@@ -356,14 +366,16 @@ fn other_pixels_of_a_texture_are_another_scene() {
 #[test]
 fn a_crop_is_a_part_of_the_whole() {
     let sandbox = Sandbox::new();
-    render(&sandbox, "-o whole.pfm --size 40x24");
-    render(&sandbox, "-o part.pfm --size 40x24 --crop 9,5,20,11");
-    let (whole, part) = (image(&sandbox, "whole.pfm"), image(&sandbox, "part.pfm"));
-    assert_eq!((part.width, part.height), (20, 11));
-    for y in 0..11 {
-        for x in 0..20 {
-            let [a, b] = [part.rgb(x, y), whole.rgb(9 + x, 5 + y)].map(|c| c.to_array().map(f32::to_bits));
-            assert_eq!(a, b, "pixel {x},{y}");
+    for i in integrators() {
+        render(&sandbox, &format!("-i {i} -o whole.pfm --size 40x24"));
+        render(&sandbox, &format!("-i {i} -o part.pfm --size 40x24 --crop 9,5,20,11"));
+        let (whole, part) = (image(&sandbox, "whole.pfm"), image(&sandbox, "part.pfm"));
+        assert_eq!((part.width, part.height), (20, 11));
+        for y in 0..11 {
+            for x in 0..20 {
+                let [a, b] = [part.rgb(x, y), whole.rgb(9 + x, 5 + y)].map(|c| c.to_array().map(f32::to_bits));
+                assert_eq!(a, b, "{i} pixel {x},{y}");
+            }
         }
     }
 }

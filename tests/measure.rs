@@ -122,7 +122,7 @@ fn the_estimated_error_is_the_true_one() {
     let build = || (path::SPEC.build)(&path_params());
     let mut reference = Film::new(scene.window);
     let budget = Budget { iterations: Some(2048), time: None };
-    render(&scene, &mut *build(), &mut reference, 1000, budget, &never, |_, _| {});
+    render(&scene, &mut *build(), &mut reference, 1000, budget, &never, |_, _, _| {});
     let reference = mean(&reference);
     for (key, value) in [("relmse", 5e-3), ("relmse_trimmed", 2e-3), ("mape", 0.04), ("mae", 0.008)] {
         let target = ErrorTarget::parse(&format!("{key}={value}")).unwrap();

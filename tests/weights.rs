@@ -7,8 +7,8 @@ mod scenes;
 
 use gallery::{GALLERY, exhibit};
 use lightsieve::integrators::replay::Contribution;
-use lightsieve::integrators::{Iteration, Params, bdpt};
-use lightsieve::math::{AreaPdf, SolidAnglePdf};
+use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, resampling};
+use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
 use lightsieve::mis::definition::{Densities, densities};
 use lightsieve::mis::{Heuristic, Joint, Node, Split, Techniques, Weigher};
 use lightsieve::path::FullPath;
@@ -17,12 +17,17 @@ use lightsieve::ray::Backend;
 use scenes::{parse, prepare};
 
 /// Every path that bidirectional path tracing finds in a grid of pixels.
-fn found(scene: &PreparedScene, params: &[(&str, &str)], iterations: u64) -> Vec<Contribution> {
-    let mut values = Params::defaults(&bdpt::SPEC);
+fn found(
+    spec: &'static IntegratorSpec,
+    scene: &PreparedScene,
+    params: &[(&str, &str)],
+    iterations: u64,
+) -> Vec<Contribution> {
+    let mut values = Params::defaults(spec);
     for (name, value) in params {
         values.set(name, value).unwrap();
     }
-    let mut integrator = (bdpt::SPEC.build)(&values);
+    let mut integrator = (spec.build)(&values);
     let [x0, y0, width, height] = scene.window;
     let mut all = vec![];
     for index in 0..iterations {
@@ -37,7 +42,7 @@ fn found(scene: &PreparedScene, params: &[(&str, &str)], iterations: u64) -> Vec
 fn weigher(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, roulette_from: u32) -> Weigher {
     let mut techniques = Techniques::parse(techniques).unwrap();
     techniques.set_light_paths(scene.film_size[0] as f32 * scene.film_size[1] as f32);
-    Weigher { techniques, heuristic, roulette_from }
+    Weigher { techniques, heuristic, roulette_from, resampled: None }
 }
 
 const SUBSETS: [&str; 6] = ["all", "-*:1", "-0:*", "-1:*", "all,-2:2,-3:1,-0:3", "-*:1,-0:*"];
@@ -52,7 +57,7 @@ fn fast_weights_are_those_of_the_definition() {
                 let heuristic = ["balance", "power"][i % 2];
                 let roulette = ["5", "1", "2"][i % 3];
                 let params = [("techniques", techniques), ("heuristic", heuristic), ("rr_depth", roulette)];
-                for c in found(&scene, &params, 12) {
+                for c in found(&bdpt::SPEC, &scene, &params, 12) {
                     let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
                     let what = format!("{name} {crop:?} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
                     assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
@@ -63,6 +68,29 @@ fn fast_weights_are_those_of_the_definition() {
         }
     }
     assert!(checked > 60_000, "{checked}");
+}
+
+#[test]
+fn resampling_aware_weights_are_those_of_the_definition() {
+    let (mut checked, mut connections) = (0, 0);
+    for name in GALLERY {
+        let scene = prepare(exhibit(name), Backend::default_available(), None);
+        for (i, techniques) in SUBSETS.into_iter().enumerate() {
+            let roulette = ["5", "1", "2"][i % 3];
+            let paths = ["200", "7", "1"][i % 3];
+            // A film of 64 pixels needs more than its share of cache points.
+            let params = [("techniques", techniques), ("rr_depth", roulette), ("paths", paths), ("caches", "50000")];
+            for c in found(&resampling::RIS, &scene, &params, 2) {
+                let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
+                let what = format!("{name} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
+                assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
+                assert!((f64::from(c.weight) - c.techniques[s].1).abs() < 1e-4, "{} {what}", c.weight);
+                checked += 1;
+                connections += usize::from(s >= 2 && c.t >= 2);
+            }
+        }
+    }
+    assert!(checked > 4000 && connections > 1000, "{checked} {connections}");
 }
 
 /// Weight of the technique with s light vertices, evaluated as if it had sampled the path. What the evaluation must not look at is
@@ -79,6 +107,7 @@ fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
                 survival: 1.0,
                 ratio: if i + 2 < n { (other(i) / own(i)) as f32 } else { POISON },
                 smooth: i + 1 < n && smooth(i),
+                ..Node::origin(AreaPdf(0.0))
             })
             .collect();
         let joint = Joint {
@@ -99,6 +128,9 @@ fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
         eye_joint,
         next_event: d.next_event as f32,
         light_can_be_hit: d.joinable[0],
+        factor: 1.0,
+        arriving: Rgb::BLACK,
+        adjoint: Rgb::BLACK,
     })
 }
 
@@ -107,11 +139,11 @@ fn weights_of_all_techniques_sum_to_one() {
     let mut checked = 0;
     for name in GALLERY {
         let scene = prepare(exhibit(name), Backend::default_available(), None);
-        let paths: Vec<FullPath> = found(&scene, &[], 3).into_iter().filter_map(|c| c.path).collect();
+        let paths: Vec<FullPath> = found(&bdpt::SPEC, &scene, &[], 8).into_iter().filter_map(|c| c.path).collect();
         for path in &paths {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
                 let weigher = weigher(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], 5);
-                let d = densities(&scene, &weigher, path);
+                let d = densities(&scene, &weigher, &|_, _| 0.0, path);
                 let slow = d.weights(&weigher);
                 // A subset need not have any technique that makes the path; single precision has no densities beyond its range.
                 let extreme = |p: &f64| *p > 0.0 && !(1e-15..1e15).contains(p);
@@ -154,7 +186,7 @@ fn weights_do_not_depend_on_the_unit_of_length() {
             + &wall(gloss, "", r#"<rotate x="1" angle="-90"/><translate y="-1"/>"#.into())
             + &wall(grey, lamp, r#"<rotate x="1" angle="90"/><scale value="0.4"/><translate y="1"/>"#.into())
             + &wall(grey, "", r#"<rotate y="1" angle="90"/><translate x="-1"/>"#.into());
-        found(&prepare(parse(&xml, &[]), Backend::default_available(), None), &[], 16)
+        found(&bdpt::SPEC, &prepare(parse(&xml, &[]), Backend::default_available(), None), &[], 16)
     };
     let unit = room(1.0);
     assert!(unit.len() > 500, "{}", unit.len());

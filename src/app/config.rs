@@ -16,6 +16,9 @@ pub(crate) struct Config {
     pub aovs: Vec<Aov>,
 }
 
+/// Parameters that say what the picture shows, whichever way it is made.
+const OF_THE_PICTURE: [&str; 2] = ["max_depth", "hide_emitters"];
+
 /// Samples per pixel when neither the command line nor the scene says.
 const DEFAULT_SPP: u64 = 64;
 
@@ -59,7 +62,15 @@ impl Config {
         };
         let mut params = Params::defaults(spec);
         for (key, value, span) in desc.integrator.iter().flat_map(|b| &b.params) {
-            // The scene's block is a proposal, perhaps for another integrator: what does not fit is said and left.
+            // What a scene says of another integrator describes the picture where it limits paths; how that one samples is its own.
+            let own = desc
+                .integrator
+                .as_ref()
+                .is_some_and(|b| integrators::find(&b.name).is_none_or(|s| s.name == spec.name));
+            if !own && !OF_THE_PICTURE.contains(&key.as_str()) {
+                continue;
+            }
+            // The scene's block is a proposal: what does not fit is said and left.
             if let Err(e) = params.set(key, value) {
                 diagnostics.push(Diagnostic::warning("integrator::parameter", e.to_string()).at(span.clone()));
             }

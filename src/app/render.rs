@@ -6,6 +6,7 @@ use super::config::Config;
 use super::{pyramid, report};
 use crate::film::Film;
 use crate::image::{OutputFormat, atomic_write, write_picture};
+use crate::integrators::Iteration;
 use crate::prepared::{PrepareOptions, PreparedScene};
 use crate::render::stats::Clock;
 use crate::render::stats::ErrorEstimate;
@@ -75,9 +76,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let params = config.params.pairs();
     let identity = (args.checkpoint.is_some() || args.resume.is_some())
         .then(|| Checkpoint::new(&scene, config.spec.name, &params, args.seed));
-    let mut film = match (&args.resume, &identity) {
+    let (mut film, state) = match (&args.resume, &identity) {
         (Some(path), Some(identity)) => identity.load(path).map_err(checkpoint_failure)?,
-        _ => Film::new(scene.window),
+        _ => (Film::new(scene.window), vec![]),
     };
 
     let interrupt = Arc::new(AtomicBool::new(false));
@@ -86,6 +87,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let mut last_checkpoint = Instant::now();
     let mut trouble = None;
     let mut integrator = (config.spec.build)(&config.params);
+    let next = Iteration { scene: &scene, seed: args.seed, index: film.iterations };
+    if !pool.install(|| integrator.restore(&next, &state)) {
+        return Err(Failure::Input("the checkpoint does not hold what this integrator has learnt".into()));
+    }
     if args.pyramid.is_some() && !integrator.keep_pyramid(scene.window, args.pyramid_depth as usize) {
         let reason =
             format!("{} has no techniques to tell apart; --pyramid needs a bidirectional integrator", config.spec.name);
@@ -106,12 +111,12 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             estimate = Some(ErrorEstimate { measure: target.key, target: target.value, estimate: found, seeds });
             return outcome;
         }
-        render(&scene, &mut *integrator, &mut film, args.seed, config.budget, &interrupt, |progress, film| {
+        render(&scene, &mut *integrator, &mut film, args.seed, config.budget, &interrupt, |progress, film, state| {
             show(&bar, progress);
             if let (Some(path), Some(identity)) = (&args.checkpoint, &identity)
                 && last_checkpoint.elapsed() > CHECKPOINT_EVERY
             {
-                trouble = trouble.take().or(identity.save(path, film).err());
+                trouble = trouble.take().or(identity.save(path, film, &state()).err());
                 last_checkpoint = Instant::now();
             }
         })
@@ -122,7 +127,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         return Err(Failure::Interrupted);
     }
     if let (Some(path), Some(identity)) = (&args.checkpoint, &identity) {
-        trouble = identity.save(path, &film).err();
+        trouble = identity.save(path, &film, &integrator.state()).err();
     }
 
     let run = (args.seed, config.threads, config.spec.name);

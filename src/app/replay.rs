@@ -74,7 +74,7 @@ fn vertex(letter: char, i: usize, v: &VertexRecord, centre: DVec3) {
         rgb(v.throughput),
         rgb(v.interior.bsdf.albedo()),
         match v.interior.delta {
-            Some([a, b]) => format!("; left by a delta event (probabilities {:.4} and {:.4})", a.0, b.0),
+            Some(([a, b], _)) => format!("; left by a delta event (probabilities {:.4} and {:.4})", a.0, b.0),
             None => String::new(),
         }
     );

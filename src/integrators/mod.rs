@@ -7,6 +7,7 @@ pub mod light;
 pub mod params;
 pub mod path;
 pub mod replay;
+pub mod resampling;
 
 pub use params::{ParamDefault, ParamError, ParamSpec, Params};
 pub use replay::Replay;
@@ -16,7 +17,8 @@ use crate::prepared::{Features, PreparedScene};
 use crate::ray::RayStats;
 
 /// Every integrator, by name.
-pub static REGISTRY: &[&IntegratorSpec] = &[&path::SPEC, &light::SPEC, &bdpt::SPEC];
+pub static REGISTRY: &[&IntegratorSpec] =
+    &[&path::SPEC, &light::SPEC, &bdpt::SPEC, &resampling::PCBPT, &resampling::RIS];
 
 /// What the registry knows of an integrator.
 pub struct IntegratorSpec {
@@ -59,6 +61,16 @@ pub trait Integrator: Send {
     /// Adds one sample per pixel to the film, in parallel on the current thread pool; the result must not depend on the
     /// number of threads.
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats;
+
+    /// What it has learnt from the iterations so far, for a checkpoint.
+    fn state(&self) -> Vec<u8> {
+        vec![]
+    }
+
+    /// Goes on from a state of the same scene, seed and parameters; `iteration` is the next. False if the state is of something else.
+    fn restore(&mut self, _iteration: &Iteration, state: &[u8]) -> bool {
+        state.is_empty()
+    }
 
     /// Starts to keep a picture of every technique, for paths of up to `max_edges` edges; false if there are no techniques to tell apart.
     fn keep_pyramid(&mut self, _window: [u32; 4], _max_edges: usize) -> bool {

@@ -1,12 +1,11 @@
 //! One sample, run again and written down: the tool with which a firefly or a value that is not finite is explained.
 
-use crate::emit::{LightEnd, LightId};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Weigher;
 use crate::mis::definition::densities;
-use crate::path::{FullPath, Interior, SurfaceVertex};
+use crate::path::{FullPath, Interior, Origin, SurfaceVertex};
 use crate::prepared::PreparedScene;
-use crate::shade::BsdfSample;
+use crate::shade::{BsdfSample, SurfacePoint};
 
 /// What happened in one sample of one pixel.
 #[derive(Clone, Debug, Default)]
@@ -85,18 +84,13 @@ impl Replay {
         let last = if eye { self.eye.last_mut() } else { self.light.last_mut() };
         if let (Some(v), true) = (last, sample.delta) {
             let (forward, reverse) = (sample.pdf, sample.pdf_reverse_delta);
-            v.interior.delta = Some(if eye { [reverse, forward] } else { [forward, reverse] });
+            v.interior.delta =
+                Some(if eye { ([reverse, forward], sample.reverse_delta) } else { ([forward, reverse], sample.value) });
         }
     }
 
     /// The path that joins the first s − 1 surface vertices of the light sub-path and the first `n_eye` of the eye sub-path.
-    pub fn path(
-        &self,
-        (light, origin, leaving): (LightId, LightEnd, Vec3),
-        s: usize,
-        n_eye: usize,
-        lens: Vec3,
-    ) -> FullPath {
+    pub fn path(&self, origin: Origin, s: usize, n_eye: usize, lens: Vec3) -> FullPath {
         // The event at the end of a sub-path is the connection, if there is one, whatever the walk did there afterwards.
         let ending = |mut part: Vec<Interior>| {
             if let (Some(v), true) = (part.last_mut(), s > 0) {
@@ -108,19 +102,22 @@ impl Replay {
             |records: &[VertexRecord], n: usize| ending(records[..n].iter().map(|v| v.interior.clone()).collect());
         let mut interior = part(&self.light, s.saturating_sub(1));
         interior.extend(part(&self.eye, n_eye).into_iter().rev());
-        FullPath { light, origin, leaving, interior, lens }
+        FullPath { origin, interior, lens }
     }
 
     /// Notes a contribution and its path; returns its number.
+    ///
+    /// `irradiance` is the Q at a point, on the side of a direction, of integrators whose weights know of resampling.
     pub fn found(
         &mut self,
         scene: &PreparedScene,
         weigher: &Weigher,
+        irradiance: &dyn Fn(&SurfacePoint, Vec3) -> f32,
         mut contribution: Contribution,
         path: Option<FullPath>,
     ) -> u32 {
         if let Some(path) = &path {
-            let densities = densities(scene, weigher, path);
+            let densities = densities(scene, weigher, irradiance, path);
             contribution.techniques =
                 densities.log_shares(weigher).into_iter().zip(densities.weights(weigher)).collect();
         }

@@ -20,6 +20,9 @@ struct Column {
     threshold: f32,
     /// Where to go otherwise.
     alias: u32,
+    /// Probability of this choice and of the other, here so that a choice touches nothing else.
+    pmf: f32,
+    alias_pmf: f32,
 }
 
 impl AliasTable {
@@ -34,10 +37,11 @@ impl AliasTable {
         let mut scaled: Vec<f64> = weights.iter().map(|&w| clean(w) / total * n as f64).collect();
         let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| scaled[i] < 1.0);
         let heaviest = (0..n).max_by(|&a, &b| scaled[a].total_cmp(&scaled[b])).unwrap_or(0);
-        let mut columns: Vec<Column> = (0..n).map(|i| Column { threshold: 1.0, alias: i as u32 }).collect();
+        let column = |threshold, i: usize| Column { threshold, alias: i as u32, pmf: 0.0, alias_pmf: 0.0 };
+        let mut columns: Vec<Column> = (0..n).map(|i| column(1.0, i)).collect();
         while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
             small.pop();
-            columns[s] = Column { threshold: scaled[s] as f32, alias: l as u32 };
+            columns[s] = column(scaled[s] as f32, l);
             scaled[l] -= 1.0 - scaled[s];
             if scaled[l] < 1.0 {
                 large.pop();
@@ -46,9 +50,12 @@ impl AliasTable {
         }
         // Rounding can leave columns that should hold exactly one. An impossible entry among them must stay impossible.
         for &s in small.iter().filter(|&&s| clean(weights[s]) == 0.0) {
-            columns[s] = Column { threshold: 0.0, alias: heaviest as u32 };
+            columns[s] = column(0.0, heaviest);
         }
-        let pmf = weights.iter().map(|&w| (clean(w) / total) as f32).collect();
+        let pmf: Vec<f32> = weights.iter().map(|&w| (clean(w) / total) as f32).collect();
+        for (column, &pmf_here) in columns.iter_mut().zip(&pmf) {
+            (column.pmf, column.alias_pmf) = (pmf_here, pmf[column.alias as usize]);
+        }
         AliasTable { columns, pmf, total }
     }
 
@@ -68,17 +75,14 @@ impl AliasTable {
     }
 
     /// A choice for `u` in [0, 1) and its probability; `None` if all weights are zero.
+    #[inline]
     pub fn sample(&self, u: f32) -> Option<(usize, Pmf)> {
-        if self.columns.is_empty() {
-            return None;
-        }
-        let n = self.columns.len();
-        // In double precision, and held below the last column: the product must not round up to the next one.
-        let x = f64::from(u) * n as f64;
-        let i = (x as usize).min(n - 1);
-        let column = self.columns[i];
-        let chosen = if ((x - i as f64) as f32) < column.threshold { i } else { column.alias as usize };
-        Some((chosen, Pmf(self.pmf[chosen])))
+        // Held below the last column: the product may round up to the next one.
+        let x = u * self.columns.len() as f32;
+        let i = (x as u32 as usize).min(self.columns.len().wrapping_sub(1));
+        let column = self.columns.get(i)?;
+        let stay = x - (i as f32) < column.threshold;
+        Some(if stay { (i, Pmf(column.pmf)) } else { (column.alias as usize, Pmf(column.alias_pmf)) })
     }
 
     /// Probability of choice `i`; zero outside.

@@ -4,6 +4,7 @@
 use super::float::ONE_MINUS_EPSILON;
 
 /// Finaliser of SplitMix64 (Steele et al. 2014): a bijection of 64 bits that passes statistical tests.
+#[inline]
 pub fn mix64(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -11,6 +12,7 @@ pub fn mix64(mut z: u64) -> u64 {
 }
 
 /// Hash of several words, order mattering.
+#[inline]
 pub fn hash_words(words: &[u64]) -> u64 {
     words.iter().fold(0x9e37_79b9_7f4a_7c15, |h, &w| {
         mix64(h.wrapping_add(0x9e37_79b9_7f4a_7c15) ^ mix64(w.wrapping_add(0x632b_e59b_d9b4_e019)))
@@ -33,6 +35,11 @@ impl HashRng {
     /// The stream of one purpose (`stream`), one pixel or light sub-path (`index`), one iteration.
     pub fn new(seed: u64, stream: u64, index: u64, iteration: u64) -> HashRng {
         HashRng { key: hash_words(&[seed, stream, index, iteration]), counter: 0 }
+    }
+
+    /// The stream of a key that is well mixed already.
+    pub fn from_key(key: u64) -> HashRng {
+        HashRng { key, counter: 0 }
     }
 
     /// Next 64 random bits.

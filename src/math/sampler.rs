@@ -3,11 +3,12 @@
 //! Each pixel has its own scramble, so pixels are independent and one pixel's samples are stratified over iterations
 //! (Burley 2020, "Practical hash-based Owen scrambling"). Values come four at a time, one set for each purpose of a vertex.
 //!
-//! The Sobol matrices and the scramble are those of the crate `sobol_burley`; two things make them cheaper here. The shuffled index
-//! is the same for all dimensions of a path and is computed once. And a Sobol point is linear in the bits of its index, so instead
-//! of one direction vector for every set bit it is the sum of one table entry for every four bits, without a branch.
+//! The Sobol matrices and the scramble are those of the crate `sobol_burley`; three things make them cheaper here. The shuffled index
+//! is the same for all dimensions of a path and is computed once. A Sobol point is linear in the bits of its index, so instead
+//! of one direction vector for every set bit it is the sum of one table entry for every four bits, without a branch. And both sets
+//! of a vertex are made together, as arrays of eight that fill a vector register, when the first of them is asked for.
 
-use super::hash::{HashRng, hash_words};
+use super::hash::{HashRng, hash_words, mix64};
 use sobol_burley::parts::{hash, owen_scramble_rev, sobol_rev, u32_to_f32_norm};
 use std::sync::LazyLock;
 
@@ -20,25 +21,37 @@ pub enum Purpose {
     Scatter = 1,
 }
 
-/// Vertices (counted from the path's origin) that get Sobol points.
+/// Vertices (counted from the path's origin, which is vertex 0) that get Sobol points.
 const SOBOL_VERTICES: u32 = 5;
-/// Sets of four dimensions: two for the origin, two for each vertex.
-const SETS: usize = 2 + 2 * SOBOL_VERTICES as usize;
+/// Dimensions of a vertex: two sets of four.
+const LANES: usize = 8;
 /// sobol_burley has 2^16 points in a sequence; later ones start another scramble.
 const SEQUENCE_BITS: u32 = 16;
 /// Index bits that one table entry stands for.
 const CHUNK: u32 = 4;
+const CHUNKS: usize = (SEQUENCE_BITS / CHUNK) as usize;
+/// What tells the dimensions of a set apart before they are scrambled (sobol_burley's constants), for both sets of a vertex.
+const LANE_KEYS: [u32; LANES] = [
+    0x912f_69ba,
+    0x174f_18ab,
+    0x691e_72ca,
+    0xb40c_c1b8,
+    0x912f_69ba ^ 1,
+    0x174f_18ab ^ 1,
+    0x691e_72ca ^ 1,
+    0xb40c_c1b8 ^ 1,
+];
 
-/// `TABLES[set][chunk][bits]`: what the index bits of a chunk contribute to four dimensions (bit-reversed).
-type Tables = [[[[u32; 4]; 1 << CHUNK]; (SEQUENCE_BITS / CHUNK) as usize]; SETS];
+/// `TABLES[vertex][chunk][bits]`: what the index bits of a chunk contribute to the dimensions of a vertex (bit-reversed).
+type Tables = [[[[u32; LANES]; 1 << CHUNK]; CHUNKS]; SOBOL_VERTICES as usize + 1];
 
 static TABLES: LazyLock<Box<Tables>> = LazyLock::new(|| {
-    let mut tables: Box<Tables> = Box::new([[[[0; 4]; 1 << CHUNK]; (SEQUENCE_BITS / CHUNK) as usize]; SETS]);
-    for (set, chunks) in tables.iter_mut().enumerate() {
+    let mut tables: Box<Tables> = Box::new([[[[0; LANES]; 1 << CHUNK]; CHUNKS]; SOBOL_VERTICES as usize + 1]);
+    for (vertex, chunks) in tables.iter_mut().enumerate() {
         for (chunk, entries) in chunks.iter_mut().enumerate() {
             for (bits, entry) in entries.iter_mut().enumerate() {
                 let index_rev = (bits as u32) << (32 - CHUNK * (chunk as u32 + 1));
-                *entry = std::array::from_fn(|d| sobol_rev(index_rev, (4 * set + d) as u32));
+                *entry = std::array::from_fn(|d| sobol_rev(index_rev, (LANES * vertex + d) as u32));
             }
         }
     }
@@ -49,10 +62,14 @@ static TABLES: LazyLock<Box<Tables>> = LazyLock::new(|| {
 #[derive(Clone, Debug)]
 pub struct PathSampler {
     tables: &'static Tables,
-    /// Chunks of the shuffled, reversed index.
-    chunks: [u8; (SEQUENCE_BITS / CHUNK) as usize],
+    /// The shuffled, reversed index.
+    shuffled_rev: u32,
     scramble: u32,
-    key: [u64; 4],
+    /// Of the numbers without Sobol points; unique to the path.
+    key: u64,
+    /// The vertex whose numbers are at hand.
+    current: u32,
+    numbers: [[f32; 4]; 2],
     rest: Option<HashRng>,
 }
 
@@ -62,59 +79,85 @@ impl PathSampler {
     pub fn new(seed: u64, stream: u64, pixel_or_path: u64, iteration: u64) -> PathSampler {
         let index = (iteration & ((1 << SEQUENCE_BITS) - 1)) as u32;
         let epoch = iteration >> SEQUENCE_BITS;
-        let scramble = hash_words(&[seed, stream, pixel_or_path, epoch]) as u32;
-        let shuffled_rev = owen_scramble_rev(index.reverse_bits(), hash(scramble ^ 0x79c6_8e4a));
+        let identity = hash_words(&[seed, stream, pixel_or_path, epoch]);
+        let scramble = identity as u32;
         PathSampler {
             tables: &TABLES,
-            chunks: std::array::from_fn(|c| (shuffled_rev >> (32 - CHUNK * (c as u32 + 1))) as u8 & ((1 << CHUNK) - 1)),
+            shuffled_rev: owen_scramble_rev(index.reverse_bits(), hash(scramble ^ 0x79c6_8e4a)),
             scramble: scramble.wrapping_mul(0x9c8f_2d3b),
-            key: [seed, stream, pixel_or_path, iteration],
+            key: mix64(identity ^ u64::from(index)),
+            current: u32::MAX,
+            numbers: [[0.0; 4]; 2],
             rest: None,
         }
     }
 
-    /// Four dimensions of the path's Sobol point; the same numbers as `sobol_burley::sample_4d`.
+    /// One set of numbers of a vertex.
     #[inline]
-    fn sobol(&self, set: usize) -> [f32; 4] {
-        const LANES: [u32; 4] = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
-        let tables = &self.tables[set];
-        let mut point = [0u32; 4];
-        for (chunk, &bits) in tables.iter().zip(&self.chunks) {
-            let entry = &chunk[bits as usize];
-            for (p, e) in point.iter_mut().zip(entry) {
-                *p ^= e;
+    fn set(&mut self, vertex: u32, set: usize) -> [f32; 4] {
+        if self.current != vertex {
+            self.current = vertex;
+            let numbers =
+                if vertex <= SOBOL_VERTICES { self.sobol(vertex) } else { self.hashed(vertex) }.map(u32_to_f32_norm);
+            self.numbers = [std::array::from_fn(|d| numbers[d]), std::array::from_fn(|d| numbers[4 + d])];
+        }
+        self.numbers[set]
+    }
+
+    /// The dimensions of a vertex of the path's Sobol point; the same as of `sobol_burley::sample_4d`.
+    #[inline]
+    fn sobol(&self, vertex: u32) -> [u32; LANES] {
+        let tables = &self.tables[vertex as usize];
+        let mut point = [0u32; LANES];
+        for (c, chunk) in tables.iter().enumerate() {
+            let entry = &chunk[(self.shuffled_rev >> (32 - CHUNK * (c as u32 + 1))) as usize % (1 << CHUNK)];
+            for d in 0..LANES {
+                point[d] ^= entry[d];
             }
         }
-        std::array::from_fn(|d| {
-            let scramble = hash(self.scramble ^ set as u32 ^ LANES[d]);
-            u32_to_f32_norm(owen_scramble_rev(point[d], scramble).reverse_bits())
-        })
+        let scramble = self.scramble ^ (2 * vertex);
+        for d in 0..LANES {
+            point[d] = owen_scramble_rev(point[d], hash(scramble ^ LANE_KEYS[d])).reverse_bits();
+        }
+        point
+    }
+
+    /// Independent numbers: a 64-bit hash of path and vertex, spread over the lanes by a 32-bit hash of either half.
+    #[inline]
+    fn hashed(&self, vertex: u32) -> [u32; LANES] {
+        let bits = mix64(self.key.wrapping_add(u64::from(vertex).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
+        let (low, high) = (bits as u32, (bits >> 32) as u32);
+        let mut lanes = [0u32; LANES];
+        for d in 0..LANES {
+            lanes[d] = hash(hash(low ^ LANE_KEYS[d]).wrapping_add(high));
+        }
+        lanes
     }
 
     /// Numbers for the origin of the path: [film x, film y, lens u, lens v] or [light, u, v, spare].
     #[inline]
     pub fn origin(&mut self) -> [f32; 4] {
-        self.sobol(0)
+        self.set(0, 0)
     }
 
     /// A second set for the origin (a light's direction).
     #[inline]
     pub fn origin_direction(&mut self) -> [f32; 4] {
-        self.sobol(1)
+        self.set(0, 1)
     }
 
     /// Numbers for vertex `vertex` (1 is the first hit).
     #[inline]
     pub fn vertex(&mut self, vertex: u32, purpose: Purpose) -> [f32; 4] {
-        if vertex <= SOBOL_VERTICES { self.sobol(2 * vertex as usize + purpose as usize) } else { self.rng().next_4() }
+        self.set(vertex, purpose as usize)
     }
 
     /// Unstratified numbers for whatever has no slot.
     #[inline]
     pub fn rng(&mut self) -> &mut HashRng {
-        let [seed, stream, index, iteration] = self.key;
-        // The stream is tagged so that it never meets a stream keyed without the tag.
-        self.rest.get_or_insert_with(|| HashRng::new(seed, stream ^ 0x5eed_0000_0000, index, iteration))
+        let key = self.key;
+        // Tagged so that the stream never meets the numbers of a vertex.
+        self.rest.get_or_insert_with(|| HashRng::from_key(mix64(key ^ 0x5eed_0000_0000_0000)))
     }
 }
 
@@ -146,6 +189,36 @@ mod tests {
         }
         // A scrambled (0, 8, 2)-net has one point in every cell of a 16 × 16 grid.
         assert!(cells.iter().all(|&n| n == 1));
+    }
+
+    #[test]
+    fn numbers_beyond_the_sobol_points_are_uniform_and_independent() {
+        // Pairs of lanes and pairs of neighbouring vertices, in an 8 × 8 grid of cells.
+        const N: usize = 64_000;
+        let mut cells = [[[0u32; 64]; 10]; 2];
+        let mut seen = std::collections::HashSet::new();
+        for path in 0..N as u64 {
+            let mut sampler = PathSampler::new(3, 0, path / 250, path % 250);
+            let at = |u: [f32; 4]| u.map(|u| (u * 8.0) as usize);
+            let (a, b) = (sampler.vertex(6, Purpose::Emitter), sampler.vertex(6, Purpose::Scatter));
+            seen.insert(a.map(f32::to_bits));
+            let c = sampler.vertex(7, Purpose::Emitter);
+            for (k, (x, y)) in [(at(a), at(b)), (at(a), at(c))].into_iter().enumerate() {
+                for i in 0..4 {
+                    cells[k][i][8 * x[i] + y[i]] += 1;
+                }
+                for (n, (i, j)) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)].into_iter().enumerate() {
+                    cells[k][4 + n][8 * x[i] + if k == 0 { x[j] } else { y[j] }] += 1;
+                }
+            }
+        }
+        assert_eq!(seen.len(), N);
+        // χ² with 63 degrees of freedom exceeds 120 with a probability of 2e-5.
+        let expected = N as f64 / 64.0;
+        for counts in cells.iter().flatten() {
+            let chi2: f64 = counts.iter().map(|&n| (f64::from(n) - expected).powi(2) / expected).sum();
+            assert!(chi2 < 120.0, "{chi2}");
+        }
     }
 
     #[test]

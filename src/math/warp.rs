@@ -4,14 +4,24 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
 /// Unit square → unit disk, equal areas, low distortion (Shirley & Chiu 1997). Density 1/π per unit area.
+#[inline]
 pub fn square_to_disk(u: [f32; 2]) -> Vec2 {
     let (a, b) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
-    // Both halves of the map are one, with the axes exchanged; selecting instead of branching suits random numbers.
-    let swap = b.abs() > a.abs();
-    let (r, other) = if swap { (b, a) } else { (a, b) };
-    let (sin, cos) = sin_cos_quarter(FRAC_PI_4 * (other / if r == 0.0 { 1.0 } else { r }));
-    let (x, y) = if swap { (sin, cos) } else { (cos, sin) };
-    Vec2::new(r * x, r * y)
+    // Both halves of the map are one, with the axes exchanged. Which half it is is random, so a branch would be guessed wrong half
+    // of the time: the radius is the larger coordinate, the angle comes from the ratio, and the exchange is an exchange of bits.
+    let swap = 0u32.wrapping_sub(u32::from(b.abs() > a.abs()));
+    let (r, other) = exchange(swap, a, b);
+    let (sin, cos) = sin_cos_quarter(FRAC_PI_4 * (other / (r + f32::MIN_POSITIVE.copysign(r))));
+    let (x, y) = exchange(swap, r * cos, r * sin);
+    Vec2::new(x, y)
+}
+
+/// (a, b) if the mask is all zeros, (b, a) if it is all ones.
+#[inline]
+fn exchange(mask: u32, a: f32, b: f32) -> (f32, f32) {
+    let (a, b) = (a.to_bits(), b.to_bits());
+    let difference = (a ^ b) & mask;
+    (f32::from_bits(a ^ difference), f32::from_bits(b ^ difference))
 }
 
 /// Sine and cosine of an angle in [−π/4, π/4] by their series, to a unit in the last place; the general functions spend most of
@@ -41,6 +51,7 @@ pub fn disk_to_square(p: Vec2) -> [f32; 2] {
 }
 
 /// Unit square → hemisphere around +z, density cos θ / π per steradian.
+#[inline]
 pub fn square_to_cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let d = square_to_disk(u);
     // 1 − |d|² can round below zero at the rim.
@@ -48,6 +59,7 @@ pub fn square_to_cosine_hemisphere(u: [f32; 2]) -> Vec3 {
 }
 
 /// Density of [`square_to_cosine_hemisphere`] per steradian.
+#[inline]
 pub fn cosine_hemisphere_pdf(cos: f32) -> f32 {
     cos.max(0.0) * FRAC_1_PI
 }
@@ -95,9 +107,11 @@ pub fn cone_to_square(v: Vec3, cos_max: f32) -> [f32; 2] {
 }
 
 /// Unit square → barycentrics (b1, b2) of a triangle, uniform in area, low distortion (Heitz 2019).
+#[inline]
 pub fn square_to_triangle(u: [f32; 2]) -> [f32; 2] {
-    let (x, y) = if u[0] < u[1] { (0.5 * u[0], u[1] - 0.5 * u[0]) } else { (u[0] - 0.5 * u[1], 0.5 * u[1]) };
-    [x, y]
+    // Half of the smaller number goes to either side: no branch that would be guessed wrong half of the time.
+    let half = 0.5 * if u[0] < u[1] { u[0] } else { u[1] };
+    [u[0] - half, u[1] - half]
 }
 
 /// Inverse of [`square_to_triangle`].

@@ -44,6 +44,11 @@ impl RayQuery for Arc<dyn RayQuery> {
         (**self).describe()
     }
 
+    #[cfg(any(embree3, embree4))]
+    fn as_embree(&self) -> Option<&crate::ray::embree::EmbreeScene> {
+        (**self).as_embree()
+    }
+
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         (**self).closest(ray)
     }

@@ -157,7 +157,7 @@ impl Reference {
         std::fs::create_dir_all(folder).map_err(|source| ReferenceError::Folder { path: folder.to_owned(), source })?;
         let mut film = Film::new(scene.window);
         let mut integrator = (method.spec.build)(&method.params);
-        let outcome = render(scene, &mut *integrator, &mut film, REFERENCE_SEED, budget, interrupt, |p, _| watch(p));
+        let outcome = render(scene, &mut *integrator, &mut film, REFERENCE_SEED, budget, interrupt, |p, _, _| watch(p));
         if outcome.stop == Stop::Interrupted {
             return Err(ReferenceError::Interrupted);
         }

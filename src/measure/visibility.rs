@@ -78,7 +78,7 @@ fn count(replay: &Replay) -> PixelCost {
 /// pool.
 pub fn cost_map(scene: &PreparedScene, method: &Contender, seed: u64, time: Duration) -> CostMap {
     let [x0, y0, width, height] = scene.window;
-    let pass = |step: u32, index: u64| -> Vec<PixelCost> {
+    let pass = |step: u32, more: u64| -> Vec<PixelCost> {
         let size = [width.div_ceil(step), height.div_ceil(step)];
         (0..size[0] * size[1])
             .into_par_iter()
@@ -87,14 +87,19 @@ pub fn cost_map(scene: &PreparedScene, method: &Contender, seed: u64, time: Dura
                 |integrator, i| {
                     let (x, y) = (i % size[0] * step + step / 2, i / size[0] * step + step / 2);
                     let pixel = (x0 + x.min(width - 1), y0 + y.min(height - 1));
-                    count(&integrator.replay(&Iteration { scene, seed, index }, pixel))
+                    count(&integrator.replay(&Iteration { scene, seed: seed.wrapping_add(more), index: 0 }, pixel))
                 },
             )
             .collect()
     };
-    // A coarse map tells how long a fine one takes.
+    // One sample tells how many a coarse map may have, and that how long a fine one takes. Methods that learn prepare a whole
+    // iteration for every sample.
     let start = Instant::now();
-    let mut step = (((f64::from(width) * f64::from(height)) / 256.0).sqrt().ceil() as u32).max(1);
+    let alone = Iteration { scene, seed, index: 0 };
+    (method.spec.build)(&method.params).replay(&alone, (x0 + width / 2, y0 + height / 2));
+    let few = (0.25 * time.as_secs_f64() / start.elapsed().as_secs_f64().max(1e-6)).clamp(16.0, 256.0);
+    let start = Instant::now();
+    let mut step = (((f64::from(width) * f64::from(height)) / few).sqrt().ceil() as u32).max(1);
     let mut pixels = pass(step, 0);
     let affordable = (time.as_secs_f64() / PASSES / start.elapsed().as_secs_f64().max(1e-6)).sqrt();
     let finer = (f64::from(step) / affordable.max(1.0)).ceil().max(1.0) as u32;

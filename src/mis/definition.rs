@@ -3,9 +3,10 @@
 
 use super::{Weigher, spread};
 use crate::emit::LightEnd;
-use crate::math::Vec3;
+use crate::math::{Rgb, Vec3};
 use crate::path::{FullPath, survival};
 use crate::prepared::PreparedScene;
+use crate::shade::{SurfacePoint, Transport};
 
 /// Densities of a path's vertices v_0 … v_k.
 #[derive(Clone, Debug)]
@@ -18,20 +19,28 @@ pub struct Densities {
     pub joinable: Vec<bool>,
     /// c_1, see `mis::weigh`.
     pub next_event: f64,
+    /// c_s of connections with s ≥ 2 and t ≥ 2, see `mis::resampled`; 1 elsewhere.
+    pub factors: Vec<f64>,
 }
 
-/// Densities of `path` where sub-paths play roulette as `weigher` says.
-pub fn densities(scene: &PreparedScene, weigher: &Weigher, path: &FullPath) -> Densities {
+/// Densities of `path` where sub-paths play roulette as `weigher` says. `irradiance` is Q at a point, on the side of a direction; only
+/// weights that know of resampling ask for it.
+pub fn densities(
+    scene: &PreparedScene,
+    weigher: &Weigher,
+    irradiance: &dyn Fn(&SurfacePoint, Vec3) -> f32,
+    path: &FullPath,
+) -> Densities {
     let k = path.edges();
-    let light = scene.lights.get(path.light);
+    let light = scene.lights.get(path.origin.light);
     let infinite = light.is_infinite();
-    let chosen = f64::from(scene.lights.pmf(path.light).0);
-    let (position, direction) = light.pdf_emission_given_vertex(path.leaving);
+    let chosen = f64::from(scene.lights.pmf(path.origin.light).0);
+    let (position, direction) = light.pdf_emission_given_vertex(path.origin.leaving);
     // From a density per steradian at v_i's neighbour to v_i's own measure along edge e, whose direction is d.
     let to_area = |i: usize, e: usize| -> f64 {
         let (d, distance) = path.edge(e);
         match i {
-            0 => match path.origin {
+            0 => match path.origin.end {
                 LightEnd::Surface { ng, .. } => f64::from(spread(ng.dot(d), distance * distance)),
                 LightEnd::Point { .. } => f64::from(distance).powi(-2),
                 LightEnd::Infinite => 1.0,
@@ -45,8 +54,8 @@ pub fn densities(scene: &PreparedScene, weigher: &Weigher, path: &FullPath) -> D
         let number = if towards_lens { i } else { k - i };
         let survives = if number >= weigher.roulette_from as usize { survival(&v.bsdf) } else { 1.0 };
         let pdf = match v.delta {
-            Some(pdfs) => pdfs[usize::from(!towards_lens)],
-            None => v.bsdf.pdf(from, to, crate::shade::Transport::Radiance),
+            Some((pdfs, _)) => pdfs[usize::from(!towards_lens)],
+            None => v.bsdf.pdf(from, to, Transport::Radiance),
         };
         f64::from(pdf.0) * f64::from(survives)
     };
@@ -54,7 +63,7 @@ pub fn densities(scene: &PreparedScene, weigher: &Weigher, path: &FullPath) -> D
     let mut from_light = vec![chosen * f64::from(if infinite { direction.0 } else { position.0 })];
     for i in 1..k {
         let density = if i == 1 {
-            let cos = f64::from(path.interior[0].point.ng.dot(path.leaving).abs());
+            let cos = f64::from(path.interior[0].point.ng.dot(path.origin.leaving).abs());
             if infinite { f64::from(position.0) * cos } else { f64::from(direction.0) * to_area(1, 0) }
         } else {
             scatter(i - 1, -path.edge(i - 2).0, path.edge(i - 1).0, true) * to_area(i, i - 1)
@@ -74,14 +83,28 @@ pub fn densities(scene: &PreparedScene, weigher: &Weigher, path: &FullPath) -> D
     let smooth = |i: usize| i == 0 || i == k || path.interior[i - 1].delta.is_none();
     let joinable = (0..=k).map(|i| if i == 0 { !light.is_delta() } else { smooth(i - 1) && smooth(i) }).collect();
     let next_event = path.interior.first().map_or(1.0, |v| {
-        let picked = f64::from(scene.lights.pmf_from(v.point.p, v.light_normal, path.light).0);
+        let picked = f64::from(scene.lights.pmf_from(v.point.p, v.light_normal, path.origin.light).0);
         if light.is_delta() {
             return picked / chosen;
         }
         let (d, distance) = path.edge(0);
         picked * f64::from(light.pdf_direct(v.point.p, -d, distance).0) * to_area(0, 0) / from_light[0]
     });
-    Densities { light: from_light, eye: from_eye, joinable, next_event }
+    let mut factors = vec![1.0; k + 1];
+    if let Some(resampled) = &weigher.resampled {
+        // β_L as a light's walk has it on arriving at v_i.
+        let mut arriving = path.origin.flux.to_array().map(f64::from);
+        for i in 2..k {
+            let v = &path.interior[i - 2];
+            let (from, to) = (-path.edge(i - 2).0, path.edge(i - 1).0);
+            let value = v.delta.map_or_else(|| v.bsdf.eval(from, to, Transport::Importance), |(_, value)| value);
+            let scattered: [f64; 3] = std::array::from_fn(|c| arriving[c] * f64::from(value[c]));
+            let brings = Rgb::from(scattered.map(|v| (v * to_area(i, i - 1)) as f32)).luminance();
+            arriving = scattered.map(|v| v / scatter(i - 1, from, to, true));
+            factors[i] = f64::from(resampled.factor(brings, irradiance(&path.interior[i - 1].point, -to)));
+        }
+    }
+    Densities { light: from_light, eye: from_eye, joinable, next_event, factors }
 }
 
 impl Densities {
@@ -91,7 +114,7 @@ impl Densities {
         (0..=k)
             .map(|s| {
                 let n = f64::from(weigher.techniques.count(s, k + 1 - s));
-                let c = if s == 1 && k >= 2 { self.next_event } else { 1.0 };
+                let c = if s == 1 && k >= 2 { self.next_event } else { self.factors[s] };
                 let possible = if self.joinable[s] { 1.0 } else { 0.0 };
                 let light: f64 = self.light[..s].iter().map(|p| p.ln()).sum();
                 // p_E(v_0) is asked of a light that cannot be hit only where the technique is impossible anyway.

@@ -9,10 +9,12 @@
 //! [`definition`] says the same once more, slowly and in double precision, for tests and for explaining single paths.
 
 pub mod definition;
+pub mod resampled;
 pub mod side;
 pub mod techniques;
 pub mod weigh;
 
+pub use resampled::Resampled;
 pub use side::{Node, Side, spread};
 pub use techniques::{Techniques, TechniquesError};
 pub use weigh::{Joint, Split, Weigher};

@@ -7,7 +7,7 @@
 //! Densities of a vertex at infinity are per steradian of its direction; the disk that emission rays start on stands in for
 //! the direction's density at the next vertex (see `emit::sample`). [`Node::spread`] hides the difference.
 
-use crate::math::{AreaPdf, SolidAnglePdf};
+use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 
 /// A vertex of one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,12 +26,34 @@ pub struct Node {
     /// Both directions of the path at this vertex are tied by a density, so that edges on either side of it can be connections. Valid
     /// once the walk has left it.
     pub smooth: bool,
+    /// Light side: c of the connection that ends at this vertex, see `mis::resampled`.
+    pub factor: f32,
+    /// Eye side: irradiance Q at this vertex, on the side that the walk goes on to.
+    pub irradiance: f32,
+    /// Eye side: value of this vertex for a walk from the light, cosine weighted.
+    pub adjoint: Rgb,
+    /// Eye side: density per steradian with which a walk from the light would go on from here to the vertex before.
+    pub reverse: f32,
 }
 
 impl Node {
+    fn plain(forward: AreaPdf) -> Node {
+        Node {
+            forward,
+            spread: 0.0,
+            survival: 1.0,
+            ratio: 0.0,
+            smooth: true,
+            factor: 1.0,
+            irradiance: 0.0,
+            adjoint: Rgb::BLACK,
+            reverse: 0.0,
+        }
+    }
+
     /// The origin of a sub-path.
     pub fn origin(forward: AreaPdf) -> Node {
-        Node { forward, spread: 0.0, survival: 1.0, ratio: 0.0, smooth: true }
+        Node { spread: 0.0, survival: 1.0, ..Node::plain(forward) }
     }
 }
 
@@ -57,7 +79,7 @@ impl Side {
     /// The walk arrived at its next vertex.
     #[inline]
     pub fn arrive(&mut self, forward: AreaPdf, spread: f32, survival: f32) {
-        self.nodes.push(Node { forward, spread, survival, ratio: 0.0, smooth: true });
+        self.nodes.push(Node { spread, survival, ..Node::plain(forward) });
     }
 
     /// The walk leaves its last vertex; `reverse` is the density per steradian there of the direction back, given the one it goes on
@@ -68,6 +90,12 @@ impl Side {
             last.smooth = !delta;
             before.ratio = reverse.0 * last.spread / before.forward.0;
         }
+    }
+
+    /// The last vertex.
+    #[inline]
+    pub fn last_mut(&mut self) -> Option<&mut Node> {
+        self.nodes.last_mut()
     }
 
     /// The first `n` vertices.

@@ -14,6 +14,8 @@ pub struct Techniques {
     on: Box<[u64; SIDES]>,
     /// Light sub-paths per iteration, the samples of each technique with t = 1.
     light_paths: f32,
+    /// Samples of each technique with s ≥ 2 and t ≥ 2.
+    connections: f32,
 }
 
 /// A list of techniques that cannot be understood.
@@ -26,17 +28,22 @@ pub struct TechniquesError(String);
 impl Techniques {
     /// All of them, with one light sub-path per iteration.
     pub fn all() -> Techniques {
-        Techniques { on: Box::new([!0; SIDES]), light_paths: 1.0 }
+        Techniques { on: Box::new([!0; SIDES]), light_paths: 1.0, connections: 1.0 }
     }
 
     /// None of them, with one light sub-path per iteration.
     pub fn none() -> Techniques {
-        Techniques { on: Box::new([0; SIDES]), light_paths: 1.0 }
+        Techniques { on: Box::new([0; SIDES]), light_paths: 1.0, connections: 1.0 }
     }
 
     /// Sets the number of light sub-paths per iteration.
     pub fn set_light_paths(&mut self, light_paths: f32) {
         self.light_paths = light_paths;
+    }
+
+    /// Sets the number of samples that an eye vertex takes of each connection with s ≥ 2.
+    pub fn set_connections(&mut self, connections: f32) {
+        self.connections = connections;
     }
 
     /// Switches the techniques with these numbers of vertices on or off.
@@ -85,6 +92,7 @@ impl Techniques {
             _ if bit == 0 => 0.0,
             0 => 0.0,
             1 => self.light_paths,
+            _ if s >= 2 => self.connections,
             _ => 1.0,
         }
     }

@@ -10,12 +10,12 @@
 //! of its two end vertices and of the two vertices behind them.
 //!
 //! Factors: c_0 = 0 if no ray can meet the light by chance; c_1 = p_direct(v_0 | v_1) / p_L(v_0) where t ≥ 2, since those techniques
-//! draw their light point as seen from v_1 (*next event*) and not as light sub-paths do; all others are 1, or 0 if an end of the
-//! connection is a delta event. Roulette is part of the densities: where it is played is counted from the end that walks.
+//! draw their light point as seen from v_1 (*next event*) and not as light sub-paths do; `mis::resampled` tells that of a
+//! resampled connection; all others are 1, or 0 if an end of the connection is a delta event. Roulette is part of the densities: where it is played is counted from the end that walks.
 
 use super::side::Node;
-use super::{Heuristic, Techniques};
-use crate::math::{AreaPdf, SolidAnglePdf};
+use super::{Heuristic, Resampled, Techniques};
+use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 
 /// How the last vertex of a side would have been walked through from the other end.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +42,13 @@ pub struct Split<'a> {
     pub next_event: f32,
     /// c_0 = 1: rays can meet the light by chance.
     pub light_can_be_hit: bool,
+    /// c of this connection, if it was resampled; else 1.
+    pub factor: f32,
+    /// Where connections are resampled: β_L of the light sub-path on arriving at z_{t−1}; if that is on the light itself, on arriving at
+    /// z_{t−2}. Unused otherwise.
+    pub arriving: Rgb,
+    /// Where connections are resampled: value of z_{t−1} for a walk from the light, cosine weighted. Unused otherwise.
+    pub adjoint: Rgb,
 }
 
 /// Everything that weights depend on besides the path.
@@ -53,16 +60,19 @@ pub struct Weigher {
     pub heuristic: Heuristic,
     /// First vertex, counted from the end that walks, at which roulette is played.
     pub roulette_from: u32,
+    /// How connections with s ≥ 2 and t ≥ 2 are resampled, if they are and weights know of it.
+    pub resampled: Option<Resampled>,
 }
 
 impl Weigher {
-    /// n_s c_s, connectability apart.
+    /// n_s c_s, connectability apart; `factor` is c where connections are resampled.
     #[inline]
-    fn share(&self, s: usize, t: usize, path: &Split) -> f32 {
+    fn share(&self, s: usize, t: usize, path: &Split, factor: f32) -> f32 {
         let n = self.techniques.count(s, t);
         match s {
             0 if !path.light_can_be_hit => 0.0,
             1 if t >= 2 => n * path.next_event,
+            _ if s >= 2 && t >= 2 => n * factor,
             _ => n,
         }
     }
@@ -76,7 +86,7 @@ impl Weigher {
     /// Σ over the techniques that have fewer than all vertices of `side`, relative to the one that has all of them and the factor 1;
     /// `other` is the number of vertices of the other side, `share(n)` the share of the technique with n vertices on this side.
     #[inline]
-    fn outward(&self, side: &[Node], joint: &Joint, other: usize, share: impl Fn(usize) -> f32) -> f32 {
+    fn outward(&self, side: &[Node], joint: &Joint, other: usize, mut share: impl FnMut(usize) -> f32) -> f32 {
         let n = side.len();
         let mut product = 1.0;
         let mut sum = 0.0;
@@ -95,8 +105,9 @@ impl Weigher {
             }
             // The technique's connection is the edge from vertex i − 1 to vertex i of this side.
             let smooth = i == 0 || (side[i - 1].smooth && (i + 1 == n || side[i].smooth));
+            let share = share(i);
             if smooth {
-                let term = self.heuristic.power(share(i));
+                let term = self.heuristic.power(share);
                 if term > 0.0 {
                     sum += product * term;
                 }
@@ -105,14 +116,43 @@ impl Weigher {
         sum
     }
 
+    /// c of the technique with n eye vertices, asked for from the connection outwards: the sub-path that a light's walk would have
+    /// made of the eye's vertices brings its light along.
+    fn eye_factor(&self, resampled: &Resampled, path: &Split, n: usize, arriving: &mut Rgb) -> f32 {
+        let (eye, s) = (path.eye, path.light.len());
+        let (t, node) = (eye.len(), &eye[n]);
+        let (adjoint, reverse) = match n + 1 == t {
+            // z_{t−1} is on the light, and what arrives at z_{t−2} is given.
+            true if s == 0 => return 1.0,
+            true => (path.adjoint, path.eye_joint.departure.0),
+            false => (node.adjoint, node.reverse),
+        };
+        let scattered = *arriving * adjoint;
+        *arriving = scattered * (1.0 / (reverse * self.survival(node, t - 1 - n + s)));
+        if n < 2 {
+            return 1.0;
+        }
+        resampled.factor(scattered.luminance() * node.spread, eye[n - 1].irradiance)
+    }
+
     /// The weight of the technique that sampled the path.
     #[inline]
     pub fn weight(&self, path: &Split) -> f32 {
         let (s, t) = (path.light.len(), path.eye.len());
         let edges = s + t;
-        let own = self.heuristic.power(self.share(s, t, path));
-        let others = self.outward(path.light, &path.light_joint, t, |n| self.share(n, edges - n, path))
-            + self.outward(path.eye, &path.eye_joint, s, |n| self.share(edges - n, n, path));
-        own / (own + others)
+        let own = self.heuristic.power(self.share(s, t, path, path.factor));
+        let from_light =
+            self.outward(path.light, &path.light_joint, t, |n| self.share(n, edges - n, path, path.light[n].factor));
+        let from_eye = match &self.resampled {
+            None => self.outward(path.eye, &path.eye_joint, s, |n| self.share(edges - n, n, path, 1.0)),
+            Some(resampled) => {
+                let mut arriving = path.arriving;
+                self.outward(path.eye, &path.eye_joint, s, |n| {
+                    let factor = self.eye_factor(resampled, path, n, &mut arriving);
+                    self.share(edges - n, n, path, factor)
+                })
+            }
+        };
+        own / (own + from_light + from_eye)
     }
 }

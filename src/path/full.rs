@@ -3,7 +3,7 @@
 //! Renders never need it. It is what slow definitions are written for, in tests and where a single sample is explained.
 
 use crate::emit::{LightEnd, LightId};
-use crate::math::{SolidAnglePdf, Vec3};
+use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::shade::{Bsdf, SurfacePoint};
 
 /// A vertex between the two ends.
@@ -15,19 +15,30 @@ pub struct Interior {
     pub bsdf: Bsdf,
     /// See [`SurfaceVertex::light_normal`](super::SurfaceVertex).
     pub light_normal: Option<Vec3>,
-    /// Of a delta event: the discrete probabilities of going on towards the lens when coming from the light, and the reverse.
-    pub delta: Option<[SolidAnglePdf; 2]>,
+    /// Of a delta event: the discrete probabilities of going on towards the lens when coming from the light, and the reverse; and what
+    /// it leaves of light that goes on towards the lens.
+    pub delta: Option<([SolidAnglePdf; 2], Rgb)>,
+}
+
+/// The light's end of a path.
+#[derive(Clone, Copy, Debug)]
+pub struct Origin {
+    /// The light that v_0 is on.
+    pub light: LightId,
+    /// v_0.
+    pub end: LightEnd,
+    /// Unit direction that leaves v_0.
+    pub leaving: Vec3,
+    /// What a light sub-path that begins like this carries to v_1: emission and its cosine over the densities of v_0 and of the
+    /// direction.
+    pub flux: Rgb,
 }
 
 /// A path of k edges.
 #[derive(Clone, Debug)]
 pub struct FullPath {
-    /// The light that v_0 is on.
-    pub light: LightId,
     /// v_0.
-    pub origin: LightEnd,
-    /// Unit direction that leaves v_0.
-    pub leaving: Vec3,
+    pub origin: Origin,
     /// v_1 … v_{k−1}.
     pub interior: Vec<Interior>,
     /// v_k, a point of the lens.
@@ -43,7 +54,7 @@ impl FullPath {
     /// Position of v_i; `None` at infinity.
     pub fn position(&self, i: usize) -> Option<Vec3> {
         if i == 0 {
-            match self.origin {
+            match self.origin.end {
                 LightEnd::Surface { p, .. } | LightEnd::Point { p } => Some(p),
                 LightEnd::Infinite => None,
             }
@@ -60,7 +71,7 @@ impl FullPath {
                 let length = d.length();
                 (d / length, length)
             }
-            _ => (self.leaving, f32::INFINITY),
+            _ => (self.origin.leaving, f32::INFINITY),
         }
     }
 }

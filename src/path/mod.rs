@@ -7,7 +7,7 @@ pub mod shadow;
 pub mod vertex;
 pub mod walk;
 
-pub use full::{FullPath, Interior};
+pub use full::{FullPath, Interior, Origin};
 pub use shadow::{ShadowQueue, direct_segment};
 pub use vertex::{Edge, SurfaceVertex};
 pub use walk::{Limits, WalkHooks, WalkStart, survival, walk};

@@ -77,17 +77,19 @@ pub fn walk<H: WalkHooks>(
     sampler: &mut PathSampler,
     hooks: &mut H,
 ) {
-    let WalkStart { mut ray, mut throughput, pdf, delta, mut kind } = start;
-    let mut edge = Edge { from: ray.o, from_normal: None, pdf, delta, survival: 1.0, distance: f32::INFINITY };
-    let mut bsdf = Bsdf::empty(&SurfacePoint::default());
+    let WalkStart { ray, mut throughput, pdf, delta, mut kind } = start;
+    let Ray { mut o, mut d, mut t_min, mut t_max } = ray;
+    let mut edge = Edge { from: o, from_normal: None, pdf, delta, survival: 1.0, distance: f32::INFINITY };
+    let mut point = SurfacePoint::default();
+    let mut bsdf = Bsdf::empty(&point);
     for index in 1..=limits.max_edges {
-        let Some(hit) = tracer.closest(&ray, kind) else {
-            hooks.escaped(index, ray.d, throughput, &edge);
+        let Some(hit) = tracer.closest(&Ray { o, d, t_min, t_max }, kind) else {
+            hooks.escaped(index, d, throughput, &edge);
             return;
         };
         edge.distance = hit.t;
-        let wo = -ray.d;
-        let (point, material) = scene.surface_point(&hit);
+        let wo = -d;
+        let material = scene.surface_point_into(&hit, &mut point);
         material.resolve_into(&mut bsdf, &point, wo);
         let light_normal = if scene.lights.choice_depends_on_place() { light_normal(&point, &bsdf, wo) } else { None };
         let vertex =
@@ -115,12 +117,8 @@ pub fn walk<H: WalkHooks>(
             survival,
             distance: f32::INFINITY,
         };
-        ray = Ray {
-            o: offset_point(point.p, point.error, point.ng, sample.wi),
-            d: sample.wi,
-            t_min: T_MIN,
-            t_max: f32::INFINITY,
-        };
+        (o, d) = (offset_point(point.p, point.error, point.ng, sample.wi), sample.wi);
+        (t_min, t_max) = (T_MIN, f32::INFINITY);
         kind = match mode {
             Transport::Radiance => RayKind::Bounce,
             Transport::Importance => RayKind::LightBounce,

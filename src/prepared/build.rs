@@ -1,6 +1,6 @@
 //! Building a [`PreparedScene`]: place, clean, centre, and hand each part to the room that knows it.
 
-use super::{Features, MeshShading, PreparedScene};
+use super::{Features, MeshShading, PreparedScene, TriangleTable};
 use crate::emit::{
     Camera, DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, LightSet, PixelFilter,
     PointLight, RadianceTexture, SpotLight, SunSky, SunSkyParams, TexturedEmission, TriangleEmission, TriangleLight,
@@ -145,6 +145,7 @@ impl PreparedScene {
         let query = options.backend.build(geometry.clone(), options.threads)?;
         Ok(PreparedScene {
             query,
+            triangles: TriangleTable::new(&geometry, &shading),
             geometry,
             meshes: shading,
             instance_normals,

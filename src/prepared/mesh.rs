@@ -34,9 +34,9 @@ impl MeshShading {
     }
 
     /// Fills in the shading normal (as `frame.n`), texture coordinates, their derivatives and the colour of the point with barycentrics
-    /// `b` on the triangle with vertex indices `i` and edges e1 = v1 − v0, e2 = v2 − v0.
+    /// `b` on the triangle with vertex indices `i`. The point holds the triangle's edges v1 − v0 and v2 − v0 as derivatives.
     #[inline]
-    pub fn interpolate(&self, i: &[usize; 3], b: [f32; 3], [e1, e2]: [Vec3; 2], point: &mut SurfacePoint) {
+    pub fn interpolate(&self, i: &[usize; 3], b: [f32; 3], point: &mut SurfacePoint) {
         if !self.normals.is_empty() {
             let n = self.normals[i[0]] * b[0] + self.normals[i[1]] * b[1] + self.normals[i[2]] * b[2];
             let length2 = n.length_squared();
@@ -49,6 +49,7 @@ impl MeshShading {
             let uv = i.map(|i| self.uvs[i]);
             point.uv = uv[0] * b[0] + uv[1] * b[1] + uv[2] * b[2];
             if self.wants_tangents {
+                let (e1, e2) = (point.dpdu, point.dpdv);
                 let (d1, d2) = (uv[1] - uv[0], uv[2] - uv[0]);
                 let det = d1.x * d2.y - d1.y * d2.x;
                 if det != 0.0 {

@@ -7,14 +7,16 @@
 pub mod build;
 pub mod features;
 pub mod mesh;
+pub mod triangles;
 
 pub use build::{PrepareError, PrepareOptions};
 pub use features::Features;
 pub use mesh::MeshShading;
+pub use triangles::TriangleTable;
 
 use crate::emit::{Camera, LightId, LightSet, PixelFilter};
 use crate::math::{DVec3, Frame, Rgb, Vec2, Vec3};
-use crate::ray::{Geometry, Hit, NONE, RayQuery, offset::barycentric_error};
+use crate::ray::{Geometry, Hit, NONE, RayQuery};
 use crate::shade::{Material, MaterialSet, SurfacePoint};
 use glam::{Affine3A, Mat3A};
 use std::sync::Arc;
@@ -27,6 +29,8 @@ pub struct PreparedScene {
     pub query: Box<dyn RayQuery>,
     /// What shading needs of each mesh of `geometry`.
     pub meshes: Vec<MeshShading>,
+    /// The triangles of `geometry` once more, as hits look them up.
+    pub triangles: TriangleTable,
     /// Inverse transposes of the instances' maps.
     pub instance_normals: Vec<Mat3A>,
     /// Materials.
@@ -55,42 +59,44 @@ impl PreparedScene {
     /// Everything that shading needs of a hit.
     #[inline]
     pub fn surface_point(&self, hit: &Hit) -> (SurfacePoint, &Material) {
-        let mesh = &self.meshes[hit.mesh as usize];
-        let buffers = &self.geometry.meshes[hit.mesh as usize];
-        let indices = buffers.triangles[hit.triangle as usize].map(|i| i as usize);
-        let corners = indices.map(|i| buffers.positions[i]);
-        let b = [1.0 - hit.u - hit.v, hit.u, hit.v];
-        let e1 = corners[1] - corners[0];
-        let e2 = corners[2] - corners[0];
-        let ng = e1.cross(e2).normalize();
+        let mut point = SurfacePoint::default();
+        let material = self.surface_point_into(hit, &mut point);
+        (point, material)
+    }
 
-        let mut point = SurfacePoint {
-            p: corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2],
-            error: barycentric_error(&corners, b),
-            ng,
-            frame: Frame { s: Vec3::X, t: Vec3::Y, n: ng },
-            uv: Vec2::new(hit.u, hit.v),
-            dpdu: e1,
-            dpdv: e2,
-            color: Rgb::WHITE,
-        };
-        if mesh.is_plain() {
-            if hit.instance != NONE {
-                self.place(&mut point, hit.instance);
-            }
-            point.frame = Frame::from_normal(point.frame.n);
-        } else {
-            mesh.interpolate(&indices, b, [e1, e2], &mut point);
-            if hit.instance != NONE {
-                self.place(&mut point, hit.instance);
-            }
-            point.frame = if mesh.wants_tangents {
-                Frame::from_normal_tangent(point.frame.n, point.dpdu)
-            } else {
-                Frame::from_normal(point.frame.n)
-            };
+    /// [`PreparedScene::surface_point`] in place, for loops: moving what has just been written in pieces stalls the processor.
+    #[inline]
+    pub fn surface_point_into(&self, hit: &Hit, point: &mut SurfacePoint) -> &Material {
+        let mesh = self.triangles.mesh(hit);
+        let triangle = self.triangles.triangle(mesh, hit);
+        (point.p, point.error) = triangle.at([1.0 - hit.u - hit.v, hit.u, hit.v]);
+        point.ng = triangle.ng();
+        [point.dpdu, point.dpdv] = triangle.edges();
+        point.uv = Vec2::new(hit.u, hit.v);
+        point.color = Rgb::WHITE;
+        point.frame = Frame::from_normal(triangle.ng());
+        if !(mesh.plain && hit.instance == NONE) {
+            self.refine(*hit, point);
         }
-        (point, self.materials.get(mesh.material))
+        self.materials.get(mesh.material)
+    }
+
+    /// What is interpolated between vertices, and the place of an instance.
+    #[inline(never)]
+    fn refine(&self, hit: Hit, point: &mut SurfacePoint) {
+        let mesh = &self.meshes[hit.mesh as usize];
+        if !mesh.is_plain() {
+            let indices = self.geometry.meshes[hit.mesh as usize].triangles[hit.triangle as usize].map(|i| i as usize);
+            mesh.interpolate(&indices, [1.0 - hit.u - hit.v, hit.u, hit.v], point);
+        }
+        if hit.instance != NONE {
+            self.place(point, hit.instance);
+        }
+        point.frame = if mesh.wants_tangents {
+            Frame::from_normal_tangent(point.frame.n, point.dpdu)
+        } else {
+            Frame::from_normal(point.frame.n)
+        };
     }
 
     /// From group space to the world; `frame.n` carries the shading normal.
@@ -115,6 +121,6 @@ impl PreparedScene {
     /// The light that the surface hit belongs to.
     #[inline]
     pub fn light_of(&self, hit: &Hit) -> Option<LightId> {
-        self.meshes[hit.mesh as usize].first_light.map(|first| LightId(first + hit.triangle))
+        self.triangles.mesh(hit).light(hit.triangle).map(LightId)
     }
 }

@@ -7,6 +7,7 @@
 
 use super::geometry::Geometry;
 use super::{Hit, NONE, PACKET, QueryError, Ray, RayQuery, SegmentPacket, T_MIN};
+use glam::Vec4;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::sync::{Arc, Mutex};
 
@@ -212,6 +213,9 @@ impl EmbreeScene {
         }
         let top = new_scene(&device);
         for (id, &mesh) in geometry.world.iter().enumerate() {
+            if mesh as usize != id {
+                return Err(QueryError("the meshes of the world are not the first ones".into()));
+            }
             attach_mesh(&device, &top, &geometry, mesh, id as u32);
         }
         for (i, instance) in geometry.instances.iter().enumerate() {
@@ -297,22 +301,80 @@ fn commit(scene: &SceneHandle) {
     unsafe { rtcCommitScene(scene.0) };
 }
 
-#[inline]
-fn raw_ray(ray: &Ray) -> RTCRay {
+/// `RTCRay` as rows of four floats. Embree reads a ray in whole rows as soon as it is called: a row that was written piece by piece
+/// would have to wait until all its pieces have reached the cache.
+#[repr(C, align(16))]
+struct RayRows {
+    o_near: Vec4,
+    d_time: Vec4,
+    t_far: f32,
+    mask: u32,
+    id: u32,
+    flags: u32,
+}
+
+const _: () = assert!(size_of::<RayRows>() == size_of::<RTCRay>() && align_of::<RayRows>() >= align_of::<RTCRay>());
+const _: () = assert!(size_of::<RTCRayHit>() == size_of::<RTCRay>() + size_of::<RTCHit>());
+
+/// `RTCRayHit` with the ray as rows.
+#[repr(C, align(16))]
+struct RayHitRows {
+    ray: RayRows,
+    hit: RTCHit,
+}
+
+#[inline(always)]
+fn raw_ray(ray: &Ray) -> RayRows {
     debug_assert!(ray.is_valid());
-    RTCRay {
-        org_x: ray.o.x,
-        org_y: ray.o.y,
-        org_z: ray.o.z,
-        tnear: ray.t_min,
-        dir_x: ray.d.x,
-        dir_y: ray.d.y,
-        dir_z: ray.d.z,
-        time: 0.0,
-        tfar: ray.t_max,
+    RayRows {
+        o_near: ray.o.extend(ray.t_min),
+        d_time: ray.d.extend(0.0),
+        t_far: ray.t_max,
         mask: u32::MAX,
         id: 0,
         flags: 0,
+    }
+}
+
+impl EmbreeScene {
+    /// [`RayQuery::closest`], for callers that know the backend.
+    #[inline(always)]
+    pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
+        let mut rows = RayHitRows { ray: raw_ray(ray), hit: RTCHit::default() };
+        rows.hit.geomID = u32::MAX;
+        rows.hit.instID = [u32::MAX];
+        // SAFETY: the scene is committed and alive, the ray is valid (checked by the caller, see `Ray::is_valid`). Both types are
+        // `repr(C)` with the same fields in the same places (sizes are checked above) and any bits are valid in either.
+        unsafe { version::intersect1(self.top.0, &mut *(&raw mut rows).cast::<RTCRayHit>()) };
+        let hit = &rows.hit;
+        if hit.geomID == u32::MAX {
+            return None;
+        }
+        // A mesh of the world has the number of its geometry (checked when the scene was built).
+        let (mesh, instance) =
+            if hit.instID[0] == u32::MAX { (hit.geomID, NONE) } else { self.in_instance(hit.geomID, hit.instID[0]) };
+        Some(Hit { t: rows.ray.t_far, u: hit.u, v: hit.v, triangle: hit.primID, mesh, instance })
+    }
+
+    /// Mesh and instance of a hit on an instance.
+    #[cold]
+    fn in_instance(&self, geometry: u32, instance: u32) -> (u32, u32) {
+        let instance = instance - self.geometry.world.len() as u32;
+        let group = self.geometry.instances[instance as usize].group;
+        (self.geometry.groups[group as usize][geometry as usize], instance)
+    }
+}
+
+/// Replaces lanes that are not valid by rays without extent.
+#[cold]
+fn scrub(valid: &Valid, rays: &mut RTCRay16) {
+    for i in (0..PACKET).filter(|&i| valid.0[i] == 0) {
+        for lanes in [&mut rays.org_x, &mut rays.org_y, &mut rays.org_z] {
+            lanes[i] = 0.0;
+        }
+        for lanes in [&mut rays.dir_x, &mut rays.dir_y, &mut rays.dir_z] {
+            lanes[i] = 0.0;
+        }
     }
 }
 
@@ -321,35 +383,20 @@ impl RayQuery for EmbreeScene {
         format!("Embree {}", self.device.version())
     }
 
-    #[inline]
-    fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let mut rayhit = RTCRayHit { ray: raw_ray(ray), hit: RTCHit::default() };
-        rayhit.hit.geomID = u32::MAX;
-        rayhit.hit.instID = [u32::MAX];
-        // SAFETY: the scene is committed and alive, the ray is valid (checked by the caller, see `Ray::is_valid`), and the
-        // structure has the alignment bindgen read off the header.
-        unsafe { version::intersect1(self.top.0, &mut rayhit) };
-        let hit = &rayhit.hit;
-        if hit.geomID == u32::MAX {
-            return None;
-        }
-        let (mesh, instance) = if hit.instID[0] == u32::MAX {
-            (self.geometry.world[hit.geomID as usize], NONE)
-        } else {
-            let instance = hit.instID[0] - self.geometry.world.len() as u32;
-            let group = self.geometry.instances[instance as usize].group;
-            (self.geometry.groups[group as usize][hit.geomID as usize], instance)
-        };
-        Some(Hit { t: rayhit.ray.tfar, u: hit.u, v: hit.v, triangle: hit.primID, mesh, instance })
+    fn as_embree(&self) -> Option<&EmbreeScene> {
+        Some(self)
     }
 
-    #[inline]
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.first_hit(ray)
+    }
+
     fn occluded(&self, ray: &Ray) -> bool {
-        let mut raw = raw_ray(ray);
-        // SAFETY: as in `closest`.
-        unsafe { version::occluded1(self.top.0, &mut raw) };
+        let mut rows = raw_ray(ray);
+        // SAFETY: as in `first_hit`.
+        unsafe { version::occluded1(self.top.0, &mut *(&raw mut rows).cast::<RTCRay>()) };
         // Embree sets tfar to −∞ when something is in the way.
-        raw.tfar < 0.0
+        rows.t_far < 0.0
     }
 
     fn occluded_packet(&self, packet: &SegmentPacket) -> (u16, u32) {
@@ -376,7 +423,14 @@ impl RayQuery for EmbreeScene {
                 + rays.dir_x[i].abs()
                 + rays.dir_y[i].abs()
                 + rays.dir_z[i].abs();
-            valid.0[i] = -i32::from(sum < 1e18 && i < packet.len);
+            valid.0[i] = -i32::from(sum < 1e18);
+        }
+        // Embree's assertions look at lanes that are masked out as well, so what is not valid must not be there at all.
+        if valid.0.contains(&0) {
+            scrub(&valid, &mut rays);
+        }
+        for lane in &mut valid.0[packet.len..] {
+            *lane = 0;
         }
         // SAFETY: the scene is committed and alive; lanes in use hold valid rays; alignment by the types.
         unsafe { version::occluded16(self.top.0, &valid, &mut rays) };

@@ -23,6 +23,7 @@ pub use phases::Phases;
 pub use tracer::{RayKind, RayStats, Tracer};
 
 use crate::math::Vec3;
+use glam::Vec3A;
 
 /// Beginning of every ray that leaves a surface (its origin is already off the surface).
 pub const T_MIN: f32 = f32::MIN_POSITIVE;
@@ -57,7 +58,7 @@ impl Ray {
     #[inline]
     pub fn is_valid(&self) -> bool {
         // A sum rather than a maximum: `f32::max` drops NaN, a sum keeps it.
-        let sum = self.o.abs().element_sum() + self.d.abs().element_sum();
+        let sum = (Vec3A::from(self.o).abs() + Vec3A::from(self.d).abs()).element_sum();
         sum < 1e18 && self.t_min >= 0.0 && !self.t_max.is_nan()
     }
 }
@@ -182,6 +183,12 @@ impl Targets<'_> {
 pub trait RayQuery: Send + Sync {
     /// Name and version, for people.
     fn describe(&self) -> String;
+
+    /// This backend as the one that [`Tracer`] calls directly.
+    #[cfg(any(embree3, embree4))]
+    fn as_embree(&self) -> Option<&embree::EmbreeScene> {
+        None
+    }
 
     /// The first thing the ray meets. The ray must be valid ([`Ray::is_valid`]).
     fn closest(&self, ray: &Ray) -> Option<Hit>;

@@ -7,6 +7,8 @@
 use super::Segment;
 use crate::math::{Vec3, float::gamma};
 
+const SQRT_3: f32 = 1.732_050_8;
+
 /// Error bound of a point interpolated between corners with weights that sum to one, and of moving it off the surface: γ(7) for
 /// the point and two roundings for the move.
 #[inline]
@@ -15,12 +17,12 @@ pub fn barycentric_error(corners: &[Vec3; 3], b: [f32; 3]) -> f32 {
     gamma(9) * sum.max_element()
 }
 
-/// Moves `p` off its surface to the side to which `towards` points. The sum is rounded as well, which the bound has room for
+/// Moves `p` off its surface to the side to which `towards` points. A box of half width `error` reaches √3 of it along a unit normal at
+/// most; that is less work than how far it reaches along `ng`. The sum is rounded as well, which the bound has room for
 /// (see [`barycentric_error`]): no step to the next float is needed.
 #[inline]
 pub fn offset_point(p: Vec3, error: f32, ng: Vec3, towards: Vec3) -> Vec3 {
-    let distance = error * ng.abs().element_sum();
-    p + ng * distance.copysign(towards.dot(ng))
+    p + ng * (error * SQRT_3).copysign(towards.dot(ng))
 }
 
 /// One end of a segment.

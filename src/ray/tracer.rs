@@ -3,6 +3,8 @@
 //! Every query would cost more in clock reads than it may, so one call in a prime number is timed and the mean stands for the rest;
 //! the clock's own cost, measured once, is taken off.
 
+#[cfg(any(embree3, embree4))]
+use super::embree::EmbreeScene;
 use super::{Hit, PACKET, Phases, Ray, RayQuery, SegmentPacket};
 use std::sync::LazyLock;
 use std::time::Instant;
@@ -25,11 +27,15 @@ pub enum RayKind {
     ShadowLens,
     /// Between two sub-paths.
     ShadowConnection,
+    /// An edge of a sub-path that makes cache points.
+    Cache,
+    /// Between a cache point and a light vertex.
+    ShadowPmf,
 }
 
 impl RayKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [RayKind; 7] = [
+    pub const ALL: [RayKind; 9] = [
         RayKind::Camera,
         RayKind::Bounce,
         RayKind::ShadowDirect,
@@ -37,11 +43,14 @@ impl RayKind {
         RayKind::LightBounce,
         RayKind::ShadowLens,
         RayKind::ShadowConnection,
+        RayKind::Cache,
+        RayKind::ShadowPmf,
     ];
 
     /// It asks only whether something is in the way.
     pub fn is_shadow(self) -> bool {
-        matches!(self, RayKind::ShadowDirect | RayKind::ShadowLens | RayKind::ShadowConnection)
+        use RayKind::{ShadowConnection, ShadowDirect, ShadowLens, ShadowPmf};
+        matches!(self, ShadowDirect | ShadowLens | ShadowConnection | ShadowPmf)
     }
 
     /// Name in statistics.
@@ -54,6 +63,8 @@ impl RayKind {
             RayKind::LightBounce => "light_bounce",
             RayKind::ShadowLens => "shadow_lens",
             RayKind::ShadowConnection => "shadow_connection",
+            RayKind::Cache => "cache",
+            RayKind::ShadowPmf => "shadow_pmf",
         }
     }
 }
@@ -83,6 +94,12 @@ impl KindStats {
         }
         let mean = self.timed_ns as f64 / self.timed_calls as f64 - *CLOCK_NS;
         mean.max(0.0) * self.calls as f64 * 1e-9
+    }
+
+    #[cold]
+    fn stop_clock(&mut self, start: Instant) {
+        self.timed_ns += start.elapsed().as_nanos() as u64;
+        self.timed_calls += 1;
     }
 }
 
@@ -133,9 +150,19 @@ impl RayStats {
     }
 }
 
+/// The closest hit of the ray with these numbers by a virtual call.
+#[inline(never)]
+fn elsewhere(query: &dyn RayQuery, o: [f32; 3], d: [f32; 3], [t_min, t_max]: [f32; 2]) -> Option<Hit> {
+    query.closest(&Ray { o: o.into(), d: d.into(), t_min, t_max })
+}
+
 /// One thread's access to the backend.
 pub struct Tracer<'a> {
     query: &'a dyn RayQuery,
+    /// The same if it is Embree, which is called directly: a ray then goes from the registers it was made in to where Embree reads
+    /// it, and the hit comes back into registers.
+    #[cfg(any(embree3, embree4))]
+    embree: Option<&'a EmbreeScene>,
     /// Counters so far.
     pub stats: RayStats,
     until_timed: u32,
@@ -145,23 +172,46 @@ impl<'a> Tracer<'a> {
     /// A tracer with empty counters.
     pub fn new(query: &'a dyn RayQuery) -> Tracer<'a> {
         LazyLock::force(&CLOCK_NS);
-        Tracer { query, stats: RayStats::default(), until_timed: TIMED_ONE_IN }
+        Tracer {
+            query,
+            #[cfg(any(embree3, embree4))]
+            embree: query.as_embree(),
+            stats: RayStats::default(),
+            until_timed: TIMED_ONE_IN,
+        }
     }
 
-    #[inline]
-    fn timed<T>(&mut self, kind: RayKind, call: impl FnOnce(&dyn RayQuery) -> T) -> T {
+    /// Counts a query of `rays` rays and makes it, on the clock if it is its turn. There is one call only, so that it is inlined once.
+    #[inline(always)]
+    fn timed<T>(&mut self, kind: RayKind, rays: u64, call: impl FnOnce(&Self) -> T) -> T {
+        self.until_timed -= 1;
+        let start = if self.until_timed == 0 { self.start_clock() } else { None };
+        let out = call(self);
         let stats = &mut self.stats.kinds[kind as usize];
         stats.calls += 1;
-        self.until_timed -= 1;
-        if self.until_timed > 0 {
-            return call(self.query);
+        stats.rays += rays;
+        if let Some(start) = start {
+            stats.stop_clock(start);
         }
-        self.until_timed = TIMED_ONE_IN;
-        let start = Instant::now();
-        let out = call(self.query);
-        stats.timed_ns += start.elapsed().as_nanos() as u64;
-        stats.timed_calls += 1;
         out
+    }
+
+    #[cold]
+    fn start_clock(&mut self) -> Option<Instant> {
+        self.until_timed = TIMED_ONE_IN;
+        Some(Instant::now())
+    }
+
+    #[inline(always)]
+    fn closest_untimed(&self, ray: &Ray) -> Option<Hit> {
+        #[cfg(any(embree3, embree4))]
+        if let Some(embree) = self.embree {
+            return embree.first_hit(ray);
+        }
+        // Part by part both ways: what is only ever passed by reference on this way must not be kept in memory on the other.
+        let (o, d) = ([ray.o.x, ray.o.y, ray.o.z], [ray.d.x, ray.d.y, ray.d.z]);
+        let hit = elsewhere(self.query, o, d, [ray.t_min, ray.t_max])?;
+        Some(Hit { t: hit.t, u: hit.u, v: hit.v, triangle: hit.triangle, mesh: hit.mesh, instance: hit.instance })
     }
 
     /// The first thing the ray meets; a ray that is not valid meets nothing and is counted.
@@ -171,17 +221,15 @@ impl<'a> Tracer<'a> {
             self.stats.invalid += 1;
             return None;
         }
-        self.stats.kinds[kind as usize].rays += 1;
-        self.timed(kind, |q| q.closest(ray))
+        self.timed(kind, 1, |tracer| tracer.closest_untimed(ray))
     }
 
     /// Bit `i` set: segment `i` is blocked. Segments that are not valid count as blocked.
     #[inline]
     pub fn occluded_packet(&mut self, packet: &SegmentPacket, kind: RayKind) -> u16 {
         debug_assert!(packet.len <= PACKET);
-        let (mask, invalid) = self.timed(kind, |q| q.occluded_packet(packet));
+        let (mask, invalid) = self.timed(kind, packet.len as u64, |tracer| tracer.query.occluded_packet(packet));
         let stats = &mut self.stats.kinds[kind as usize];
-        stats.rays += packet.len as u64;
         stats.blocked += u64::from(mask.count_ones());
         self.stats.invalid += u64::from(invalid);
         mask

@@ -1,7 +1,8 @@
 //! Checkpoints: the film's sums in full precision, and what must be the same for a resumed render to go on bit by bit.
 //!
 //! A file is one line of JSON (what was rendered), then the sums: for each tile in order, for each pixel, three sums and three
-//! sums of squares as little-endian doubles, then the number of non-finite samples as a 64-bit integer.
+//! sums of squares as little-endian doubles, then the number of non-finite samples as a 64-bit integer; last, what the
+//! integrator has learnt, in words of its own.
 
 use super::scene_hash::scene_hash;
 use crate::film::{Film, NonFinite};
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-const FORMAT: &str = "lightsieve-checkpoint-1";
+const FORMAT: &str = "lightsieve-checkpoint-2";
 
 /// What a checkpoint belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,11 +73,11 @@ impl Checkpoint {
         }
     }
 
-    /// Writes the film; whole or not at all.
+    /// Writes the film and what the integrator has learnt; whole or not at all.
     ///
     /// # Errors
     /// If the file system refuses.
-    pub fn save(&self, path: &Path, film: &Film) -> Result<(), CheckpointError> {
+    pub fn save(&self, path: &Path, film: &Film, state: &[u8]) -> Result<(), CheckpointError> {
         let header = Checkpoint { iterations: film.iterations, non_finite_at: film.non_finite().1, ..self.clone() };
         let io = |source| CheckpointError::Io { path: path.to_owned(), source };
         let json = serde_json::to_string(&header).map_err(|e| io(e.into()))?;
@@ -92,16 +93,17 @@ impl Checkpoint {
                 bytes.extend_from_slice(&tile.non_finite.to_le_bytes());
                 w.write_all(&bytes)?;
             }
+            w.write_all(state)?;
             Ok(())
         })
         .map_err(io)
     }
 
-    /// Reads a film back, if the checkpoint is of this render.
+    /// Reads a film and an integrator's state back, if the checkpoint is of this render.
     ///
     /// # Errors
     /// If it is not, or is damaged.
-    pub fn load(&self, path: &Path) -> Result<Film, CheckpointError> {
+    pub fn load(&self, path: &Path) -> Result<(Film, Vec<u8>), CheckpointError> {
         let io = |source| CheckpointError::Io { path: path.to_owned(), source };
         let format = |reason: &str| CheckpointError::Format { path: path.to_owned(), reason: reason.into() };
         let mut data = Vec::new();
@@ -139,6 +141,7 @@ impl Checkpoint {
         if let Some(tile) = film.tiles.first_mut() {
             tile.places = found.non_finite_at;
         }
-        Ok(film)
+        let state = words.flat_map(u64::to_le_bytes).collect();
+        Ok((film, state))
     }
 }

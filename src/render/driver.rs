@@ -67,7 +67,7 @@ pub struct Outcome {
 }
 
 /// Renders into `film` until the budget is used up or `interrupt` is set; calls `watch` after every iteration, which may save a
-/// checkpoint (its time is not counted). Runs on the current thread pool.
+/// checkpoint (its time is not counted) with what the integrator has learnt. Runs on the current thread pool.
 pub fn render(
     scene: &PreparedScene,
     integrator: &mut dyn Integrator,
@@ -75,7 +75,7 @@ pub fn render(
     seed: u64,
     budget: Budget,
     interrupt: &AtomicBool,
-    mut watch: impl FnMut(&Progress, &Film),
+    mut watch: impl FnMut(&Progress, &Film, &dyn Fn() -> Vec<u8>),
 ) -> Outcome {
     let mut clock = Clock::default();
     let mut rays = RayStats::default();
@@ -94,6 +94,7 @@ pub fn render(
         watch(
             &Progress { iterations: film.iterations, rays: rays.total(), elapsed, done: share(&budget, film, elapsed) },
             film,
+            &|| integrator.state(),
         );
     };
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);

@@ -83,7 +83,7 @@ impl Picture {
                 let mut film = Film::new(scene.window);
                 let budget = Budget { iterations: Some(spp), time: None };
                 let never = AtomicBool::new(false);
-                let outcome = render(scene, &mut *(spec.build)(&values), &mut film, seed, budget, &never, |_, _| {});
+                let outcome = render(scene, &mut *(spec.build)(&values), &mut film, seed, budget, &never, |_, _, _| {});
                 assert_eq!(film.non_finite(), (0, vec![]), "{}", spec.name);
                 assert_eq!(outcome.rays.invalid, 0, "{}", spec.name);
                 let mut mean = vec![[0.0; 3]; (film.width * film.height) as usize];

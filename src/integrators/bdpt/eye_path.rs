@@ -3,19 +3,21 @@
 use super::light_path::{LightPath, LightVertex};
 use super::{Bidirectional, Found};
 use crate::emit::LightId;
-use crate::emit::{DirectSample, Light, LightEnd};
+use crate::emit::{DirectSample, LightEnd};
+use crate::integrators::Iteration;
 use crate::integrators::replay::{Contribution, Replay};
+use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
-use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
+use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::{Joint, Node, Side, Split, spread};
-use crate::path::{Edge, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment, survival};
+use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment, survival};
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 use crate::ray::offset::{SegmentEnd, segment};
-use crate::shade::{BsdfSample, Transport};
+use crate::shade::{BsdfSample, SurfacePoint, Transport};
 
 /// Where contributions of an eye sub-path wait and go.
-pub(super) struct EyeQueues<'a> {
+pub(in crate::integrators) struct EyeQueues<'a> {
     pub direct: &'a mut ShadowQueue<Found>,
     pub connection: &'a mut ShadowQueue<Found>,
     /// Takes what has arrived.
@@ -24,16 +26,61 @@ pub(super) struct EyeQueues<'a> {
 
 /// How a contribution was made known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Arrival {
+pub(in crate::integrators) enum Arrival {
     Hit,
     Direct,
     Connection,
 }
 
+/// A light sub-path that an eye vertex is connected to.
+pub(in crate::integrators) struct Candidate<'a> {
+    /// Its last vertex, y_{s−1}.
+    pub vertex: &'a LightVertex,
+    /// Its s vertices.
+    pub nodes: &'a [Node],
+    /// c_1 of paths with its first two vertices.
+    pub next_event: f32,
+    /// See `mis::weigh`.
+    pub light_can_be_hit: bool,
+    /// y_0.
+    pub origin: Option<Origin>,
+    /// Number of the sub-path among those of the iteration, if it was drawn from many.
+    pub number: Option<u32>,
+    /// One over the expected number of times that this sub-path is drawn for one of its kind.
+    pub scale: f32,
+}
+
+impl<'a> Candidate<'a> {
+    /// A vertex of a sub-path that is joined as it is.
+    fn of(path: &'a LightPath, vertex: &'a LightVertex) -> Candidate<'a> {
+        Candidate {
+            vertex,
+            nodes: path.side.first(vertex.s),
+            next_event: path.next_event,
+            light_can_be_hit: path.light_can_be_hit,
+            origin: path.origin,
+            number: None,
+            scale: 1.0,
+        }
+    }
+}
+
+/// What a light sub-path carries that begins at `end` in the unit direction `leaving` with the density `drawn` of both together, towards a
+/// vertex at `distance`, where it arrives as `radiance` (of a point: intensity / distance²).
+fn flux(end: &LightEnd, radiance: Rgb, leaving: Vec3, distance: f32, drawn: f32) -> Rgb {
+    let at_light = match end {
+        LightEnd::Surface { ng, .. } => ng.dot(leaving).abs(),
+        LightEnd::Point { .. } => distance * distance,
+        LightEnd::Infinite => 1.0,
+    };
+    radiance * (at_light / drawn)
+}
+
 /// The hooks of an eye sub-path that is joined with `light`.
-pub(super) struct EyeHooks<'a, 'q> {
+pub(in crate::integrators) struct EyeHooks<'a, 'q> {
     pub this: &'a Bidirectional,
     pub scene: &'a PreparedScene,
+    pub iteration: &'a Iteration<'a>,
     pub light: &'a LightPath,
     pub side: &'a mut Side,
     pub cos_leaving: f32,
@@ -45,26 +92,32 @@ pub(super) struct EyeHooks<'a, 'q> {
 }
 
 impl EyeHooks<'_, '_> {
-    /// A contribution of the technique (s, t); `origin` is its light vertex y_0 and the direction that leaves it.
+    /// A contribution of the technique (s, t) with its light vertex y_0 and, if its light sub-path was drawn from many, that one's number.
     fn found(
         &mut self,
         (s, t): (usize, usize),
-        origin: Option<(LightId, LightEnd, Vec3)>,
+        (origin, number): (Option<Origin>, Option<u32>),
         raw: Rgb,
         weight: f32,
     ) -> Found {
         let (scene, weigher, pixel, lens) = (self.scene, &self.this.weigher, self.pixel, self.lens);
+        let (this, iteration) = (self.this, self.iteration);
+        let resampler = &this.resampler;
         let note = self.record.as_mut().map_or(0, |record| {
             // z_1 … z_{t−1}, of which the last is the light's vertex if the walk hit it.
             let n_eye = if s == 0 { t - 2 } else { t - 1 };
+            if let Some(number) = number {
+                record.light = LightStore::retrace(this, iteration, number);
+            }
             let path = origin.map(|origin| record.path(origin, s, n_eye, lens));
-            record.found(scene, weigher, Contribution::new((s, t), pixel, raw, weight), path)
+            let irradiance = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(0.0, |r| r.irradiance(p, d));
+            record.found(scene, weigher, &irradiance, Contribution::new((s, t), pixel, raw, weight), path)
         });
         Found { x: pixel.0, y: pixel.1, path: 0, note, s: s as u16, t: t as u16, raw, weight }
     }
 
     /// (0, t): the walk met the light `id` in `direction`. The vertex on the light is the last of `side`.
-    fn hit(&mut self, id: LightId, end: LightEnd, direction: Vec3, raw: Rgb, edge: &Edge) {
+    fn hit(&mut self, id: LightId, end: LightEnd, direction: Vec3, (throughput, emitted): (Rgb, Rgb), edge: &Edge) {
         let t = self.side.nodes().len();
         if !self.this.weigher.techniques.uses(0, t) || (t == 2 && self.this.hide_emitters) {
             return;
@@ -76,6 +129,12 @@ impl EyeHooks<'_, '_> {
         let (origin, departure) =
             if light.is_infinite() { (AreaPdf(emission.0), SolidAnglePdf(position.0)) } else { (position, emission) };
         let origin = origin * chosen;
+        let origin_of = Origin {
+            light: id,
+            end,
+            leaving: -direction,
+            flux: flux(&end, emitted, -direction, edge.distance, position.0 * emission.0 * chosen.0),
+        };
         let next_event = if t >= 3 {
             let direct = light.pdf_direct(edge.from, direction, edge.distance)
                 * lights.pmf_from(edge.from, edge.from_normal, id);
@@ -93,9 +152,12 @@ impl EyeHooks<'_, '_> {
             eye_joint: Joint { arrival: origin, departure },
             next_event,
             light_can_be_hit: true,
+            factor: 1.0,
+            arriving: origin_of.flux,
+            adjoint: Rgb::BLACK,
         };
         let weight = self.this.weigher.weight(&split);
-        let found = self.found((0, t), Some((id, end, -direction)), raw, weight);
+        let found = self.found((0, t), (Some(origin_of), None), throughput * emitted, weight);
         (self.queues.found)(Arrival::Hit, found);
     }
 
@@ -116,9 +178,17 @@ impl EyeHooks<'_, '_> {
         if raw.is_black() {
             return;
         }
-        let weight = self.direct_weight(vertex, light, lights.pmf(id), &sample, density, bsdf_pdf);
+        let (position, emission) = light.pdf_emission_given_vertex(-sample.wi);
+        let drawn = position.0 * emission.0 * lights.pmf(id).0;
+        let origin = Origin {
+            light: id,
+            end: sample.end,
+            leaving: -sample.wi,
+            flux: flux(&sample.end, sample.radiance, -sample.wi, sample.distance, drawn),
+        };
+        let weight = self.direct_weight(vertex, &origin, &sample, density, bsdf_pdf);
         let segment = direct_segment(point, &sample);
-        let found = self.found((1, t), Some((id, sample.end, -sample.wi)), raw, weight);
+        let found = self.found((1, t), (Some(origin), None), raw, weight);
         let arrived = &mut *self.queues.found;
         self.queues.direct.push(&segment, found, tracer, |f| arrived(Arrival::Direct, f));
     }
@@ -126,8 +196,7 @@ impl EyeHooks<'_, '_> {
     fn direct_weight(
         &self,
         vertex: &SurfaceVertex,
-        light: &Light,
-        chosen: Pmf,
+        from: &Origin,
         sample: &DirectSample,
         density: SolidAnglePdf,
         bsdf_pdf: SolidAnglePdf,
@@ -136,6 +205,8 @@ impl EyeHooks<'_, '_> {
         let point = vertex.point;
         let cos = point.ng.dot(sample.wi);
         let dist2 = sample.distance * sample.distance;
+        let light = self.scene.lights.get(from.light);
+        let chosen = self.scene.lights.pmf(from.light);
         let (position, emission) = light.pdf_emission_given_vertex(-sample.wi);
         // Per steradian at the eye vertex → per unit area at the light vertex.
         let to_area = match sample.end {
@@ -144,6 +215,7 @@ impl EyeHooks<'_, '_> {
         };
         let origin = sample.end.vertex_density(position, emission) * chosen;
         let walked = bsdf_pdf.0 * self.this.limits.survival(vertex.index, vertex.bsdf);
+        let back = vertex.bsdf.eval_and_pdf(sample.wi, vertex.wo, Transport::Importance);
         let split = Split {
             light: &[Node::origin(origin)],
             light_joint: Joint {
@@ -151,18 +223,19 @@ impl EyeHooks<'_, '_> {
                 departure: SolidAnglePdf(0.0),
             },
             eye: self.side.first(t),
-            eye_joint: Joint {
-                arrival: sample.end.next_density(position, emission, cos, dist2),
-                departure: vertex.bsdf.pdf(sample.wi, vertex.wo, Transport::Importance),
-            },
+            eye_joint: Joint { arrival: sample.end.next_density(position, emission, cos, dist2), departure: back.1 },
             next_event: density.0 * to_area / origin.0,
             light_can_be_hit: !light.is_delta(),
+            factor: 1.0,
+            arriving: from.flux,
+            adjoint: back.0,
         };
         self.this.weigher.weight(&split)
     }
 
     /// (s, t) with s ≥ 2: to a vertex of the light sub-path.
-    fn connect(&mut self, vertex: &SurfaceVertex, light: &LightVertex, tracer: &mut Tracer) {
+    fn connect(&mut self, vertex: &SurfaceVertex, to: &Candidate, tracer: &mut Tracer) {
+        let light = to.vertex;
         let t = vertex.index as usize + 1;
         let (z, y) = (vertex.point, &light.point);
         let offset = y.p - z.p;
@@ -177,33 +250,40 @@ impl EyeHooks<'_, '_> {
             return;
         }
         let (at_light, light_pdf) = light.bsdf.eval_and_pdf(light.wo, -to_light, Transport::Importance);
-        let raw = vertex.throughput * at_eye * at_light * light.throughput * (1.0 / dist2);
+        let raw = vertex.throughput * at_eye * at_light * light.throughput * (to.scale / dist2);
         if raw.is_black() {
             return;
         }
         let limits = &self.this.limits;
         let eye_pdf = eye_pdf.0 * limits.survival(vertex.index, vertex.bsdf);
         let light_pdf = light_pdf.0 * limits.survival(light.s as u32 - 1, &light.bsdf);
+        let back = vertex.bsdf.eval_and_pdf(to_light, vertex.wo, Transport::Importance);
+        let arriving = light.throughput * at_light * (1.0 / light_pdf);
+        let arrival = light_pdf * spread(z.ng.dot(to_light), dist2);
+        let factor =
+            self.this.resampler.as_ref().map_or(1.0, |resampler| {
+                resampler.factor(&self.this.weigher, arriving.luminance() * arrival, z, to_light)
+            });
         let split = Split {
-            light: self.light.side.first(light.s),
+            light: to.nodes,
             light_joint: Joint {
                 arrival: AreaPdf(eye_pdf * spread(y.ng.dot(to_light), dist2)),
                 departure: light.bsdf.pdf(-to_light, light.wo, Transport::Radiance),
             },
             eye: self.side.first(t),
-            eye_joint: Joint {
-                arrival: AreaPdf(light_pdf * spread(z.ng.dot(to_light), dist2)),
-                departure: vertex.bsdf.pdf(to_light, vertex.wo, Transport::Importance),
-            },
-            next_event: self.light.next_event,
-            light_can_be_hit: self.light.light_can_be_hit,
+            eye_joint: Joint { arrival: AreaPdf(arrival), departure: back.1 },
+            next_event: to.next_event,
+            light_can_be_hit: to.light_can_be_hit,
+            factor,
+            arriving,
+            adjoint: back.0,
         };
         let weight = self.this.weigher.weight(&split);
         let segment = segment(
             &SegmentEnd::Surface { p: z.p, error: z.error, ng: z.ng },
             &SegmentEnd::Surface { p: y.p, error: y.error, ng: y.ng },
         );
-        let found = self.found((light.s, t), self.light.origin, raw, weight);
+        let found = self.found((light.s, t), (to.origin, to.number), raw, weight);
         let arrived = &mut *self.queues.found;
         self.queues.connection.push(&segment, found, tracer, |f| arrived(Arrival::Connection, f));
     }
@@ -223,7 +303,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
             let emitted = light.emitted([vertex.hit.u, vertex.hit.v], vertex.wo);
             if !emitted.is_black() {
                 let end = light.end_at(point.p, point.error);
-                self.hit(id, end, -vertex.wo, vertex.throughput * emitted, edge);
+                self.hit(id, end, -vertex.wo, (vertex.throughput, emitted), edge);
             }
         }
         if vertex.bsdf.is_black() {
@@ -232,14 +312,28 @@ impl WalkHooks for EyeHooks<'_, '_> {
         let max_edges = self.this.limits.max_edges;
         if vertex.index < max_edges && vertex.bsdf.connectable() {
             let t = vertex.index as usize + 1;
-            let techniques = &self.this.weigher.techniques;
+            let this = self.this;
+            let techniques = &this.weigher.techniques;
             if techniques.uses(1, t) {
                 self.next_event(vertex, tracer, sampler);
             }
+            let possible = |y: &LightVertex| (y.s + t - 1) as u64 <= u64::from(max_edges) && techniques.uses(y.s, t);
             let light = self.light;
-            for y in &light.vertices {
-                if (y.s + t - 1) as u64 <= u64::from(max_edges) && self.this.weigher.techniques.uses(y.s, t) {
-                    self.connect(vertex, y, tracer);
+            match &this.resampler {
+                None => {
+                    for y in light.vertices.iter().filter(|y| possible(y)) {
+                        self.connect(vertex, &Candidate::of(light, y), tracer);
+                    }
+                }
+                Some(resampler) => {
+                    for _ in 0..resampler.settings.samples {
+                        let u = sampler.rng().next_4();
+                        if let Some(candidate) = resampler.draw(vertex.point, vertex.wo, [u[0], u[1]])
+                            && possible(candidate.vertex)
+                        {
+                            self.connect(vertex, &candidate, tracer);
+                        }
+                    }
                 }
             }
         }
@@ -254,6 +348,15 @@ impl WalkHooks for EyeHooks<'_, '_> {
             vertex.bsdf.pdf(sample.wi, vertex.wo, Transport::Importance)
         };
         self.side.leave(reverse, sample.delta);
+        if let (Some(resampler), Some(node)) = (&self.this.resampler, self.side.last_mut()) {
+            node.irradiance = resampler.irradiance(vertex.point, sample.wi);
+            let value = if sample.delta {
+                sample.reverse_delta
+            } else {
+                vertex.bsdf.eval(sample.wi, vertex.wo, Transport::Importance)
+            };
+            (node.adjoint, node.reverse) = (value, reverse.0);
+        }
         if let Some(record) = &mut self.record {
             record.leaving(true, sample);
         }
@@ -266,7 +369,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
         for &id in lights.infinite() {
             let emitted = lights.get(id).emitted([0.0; 2], -direction);
             if !emitted.is_black() {
-                self.hit(id, LightEnd::Infinite, direction, throughput * emitted, edge);
+                self.hit(id, LightEnd::Infinite, direction, (throughput, emitted), edge);
             }
         }
     }

@@ -6,7 +6,7 @@ use crate::integrators::replay::{Contribution, Replay};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::{Joint, Node, Side, Split, spread};
-use crate::path::{Edge, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, survival, walk};
+use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, survival, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
 use crate::ray::{Ray, RayKind, Segment, T_MIN, Tracer};
@@ -14,7 +14,7 @@ use crate::shade::{Bsdf, BsdfSample, SurfacePoint, Transport};
 
 /// A vertex y_{s−1} of a light sub-path, s ≥ 2, that eye vertices can be connected to.
 #[derive(Clone, Debug)]
-pub(super) struct LightVertex {
+pub(in crate::integrators) struct LightVertex {
     pub point: SurfacePoint,
     pub bsdf: Bsdf,
     /// Unit direction towards y_{s−2}.
@@ -27,7 +27,7 @@ pub(super) struct LightVertex {
 
 /// A light sub-path, with what connections to it need.
 #[derive(Clone, Debug, Default)]
-pub(super) struct LightPath {
+pub(in crate::integrators) struct LightPath {
     /// Densities of all its vertices.
     pub side: Side,
     /// Those of its vertices that can be connected to.
@@ -36,19 +36,22 @@ pub(super) struct LightPath {
     pub next_event: f32,
     /// Rays can meet the light by chance.
     pub light_can_be_hit: bool,
-    /// The light, y_0, and the unit direction that leaves it; nothing if no light was drawn.
-    pub origin: Option<(LightId, LightEnd, Vec3)>,
+    /// y_0; nothing if no light was drawn.
+    pub origin: Option<Origin>,
 }
 
-/// Traces light sub-path number `path` of the iteration and connects its vertices to the lens. It leaves its vertices in `out`.
-pub(super) fn trace(
+/// Traces a light sub-path and connects its vertices to the lens, if `lens` takes that. It leaves its densities in `out`, and its
+/// vertices if `keep` says so.
+#[allow(clippy::too_many_arguments)]
+pub(in crate::integrators) fn trace(
     this: &Bidirectional,
     scene: &PreparedScene,
     sampler: &mut PathSampler,
     tracer: &mut Tracer,
     out: &mut LightPath,
-    lens: &mut LensQueue,
+    lens: Option<&mut LensQueue>,
     record: Option<&mut Replay>,
+    keep: bool,
 ) {
     out.vertices.clear();
     out.origin = None;
@@ -60,11 +63,12 @@ pub(super) fn trace(
     let origin = emission.vertex_density() * chosen;
     out.side.begin(origin);
     out.light_can_be_hit = !light.is_delta();
-    out.origin = Some((id, emission.end, emission.direction));
-    let mut hooks = LightHooks { this, scene, id, chosen, emission: &emission, cos_leaving: 0.0, out, lens, record };
+    let flux = emission.flux() * (1.0 / chosen.0);
+    out.origin = Some(Origin { light: id, end: emission.end, leaving: emission.direction, flux });
+    let mut hooks =
+        LightHooks { this, scene, id, chosen, emission: &emission, cos_leaving: 0.0, out, lens, record, keep };
     hooks.emitter_to_lens([v[2], v[3]], tracer, sampler);
-    let throughput = emission.flux() * (1.0 / chosen.0);
-    if throughput.is_black() || this.limits.max_edges < 2 {
+    if flux.is_black() || this.limits.max_edges < 2 {
         return;
     }
     let start = WalkStart {
@@ -76,7 +80,7 @@ pub(super) fn trace(
             t_min: T_MIN,
             t_max: f32::INFINITY,
         },
-        throughput,
+        throughput: flux,
         pdf: emission.pdf_direction,
         delta: false,
         kind: RayKind::Light,
@@ -87,7 +91,7 @@ pub(super) fn trace(
 }
 
 /// Connections to the lens on their way.
-pub(super) struct LensQueue<'a> {
+pub(in crate::integrators) struct LensQueue<'a> {
     pub queue: &'a mut ShadowQueue<Found>,
     pub found: &'a mut dyn FnMut(Found),
     /// Number of the light sub-path.
@@ -103,8 +107,10 @@ struct LightHooks<'a, 'q> {
     /// |cos| at the vertex before, between its geometric normal and the edge.
     cos_leaving: f32,
     out: &'a mut LightPath,
-    lens: &'a mut LensQueue<'q>,
+    lens: Option<&'a mut LensQueue<'q>>,
     record: Option<&'a mut Replay>,
+    /// Vertices are kept for connections.
+    keep: bool,
 }
 
 impl LightHooks<'_, '_> {
@@ -133,19 +139,25 @@ impl LightHooks<'_, '_> {
         }
         let raw = raw * filter;
         let (scene, weigher) = (self.scene, &self.this.weigher);
-        let origin = (self.id, self.emission.end, leaving);
+        let (origin, resampler) = (self.out.origin, &self.this.resampler);
         let note = self.record.as_mut().map_or(0, |record| {
-            let path = record.path(origin, s, 0, lens.p);
-            record.found(scene, weigher, Contribution::new((s, 1), (x, y), raw, weight), Some(path))
+            let path = origin.map(|o| record.path(Origin { leaving, ..o }, s, 0, lens.p));
+            let irradiance = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(0.0, |r| r.irradiance(p, d));
+            record.found(scene, weigher, &irradiance, Contribution::new((s, 1), (x, y), raw, weight), path)
         });
-        let found = Found { x, y, note, path: self.lens.path, s: s as u16, t: 1, raw, weight };
-        let arrived = &mut *self.lens.found;
-        self.lens.queue.push(segment, found, tracer, arrived);
+        let Some(queue) = &mut self.lens else { return };
+        let found = Found { x, y, note, path: queue.path, s: s as u16, t: 1, raw, weight };
+        let arrived = &mut *queue.found;
+        queue.queue.push(segment, found, tracer, arrived);
     }
 
     /// (s, t) = (1, 1): the light itself as the lens sees it.
     fn emitter_to_lens(&mut self, u: [f32; 2], tracer: &mut Tracer, sampler: &mut PathSampler) {
-        if !self.this.weigher.techniques.uses(1, 1) || !self.out.light_can_be_hit || self.this.hide_emitters {
+        if self.lens.is_none()
+            || !self.this.weigher.techniques.uses(1, 1)
+            || !self.out.light_can_be_hit
+            || self.this.hide_emitters
+        {
             return;
         }
         let (scene, emission) = (self.scene, self.emission);
@@ -187,6 +199,9 @@ impl LightHooks<'_, '_> {
             eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             next_event: 1.0,
             light_can_be_hit: !light.is_delta(),
+            factor: 1.0,
+            arriving: Rgb::BLACK,
+            adjoint: Rgb::BLACK,
         };
         let weight = self.this.weigher.weight(&split);
         let filter = sampler.rng().next_4();
@@ -214,6 +229,9 @@ impl LightHooks<'_, '_> {
             eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             next_event: self.out.next_event,
             light_can_be_hit: self.out.light_can_be_hit,
+            factor: 1.0,
+            arriving: Rgb::BLACK,
+            adjoint: Rgb::BLACK,
         };
         let weight = self.this.weigher.weight(&split);
         let from = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
@@ -265,6 +283,11 @@ impl WalkHooks for LightHooks<'_, '_> {
         } else {
             let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
             self.out.side.arrive(forward, spread(self.cos_leaving, dist2), survival(vertex.bsdf));
+            if let (Some(resampler), Some(node)) = (&self.this.resampler, self.out.side.last_mut()) {
+                // What the sub-path brings here is its throughput times the density of having come here.
+                let brings = vertex.throughput.luminance() * forward.0;
+                node.factor = resampler.factor(&self.this.weigher, brings, point, vertex.wo);
+            }
         }
         if let Some(record) = &mut self.record {
             record.vertex(false, vertex);
@@ -274,10 +297,10 @@ impl WalkHooks for LightHooks<'_, '_> {
         }
         let s = index as usize + 1;
         if vertex.bsdf.connectable() {
-            if self.this.weigher.techniques.uses(s, 1) {
+            if self.lens.is_some() && self.this.weigher.techniques.uses(s, 1) {
                 self.vertex_to_lens(vertex, tracer, sampler);
             }
-            if self.this.connects {
+            if self.keep {
                 self.out.vertices.push(LightVertex {
                     point: *point,
                     bsdf: vertex.bsdf.clone(),

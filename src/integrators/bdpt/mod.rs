@@ -11,9 +11,10 @@
 //!
 //! Weights are `mis`'s. Shadow rays wait in queues and go out in packets; nothing depends on how these were filled.
 
-mod eye_path;
-mod light_path;
+pub(super) mod eye_path;
+pub(super) mod light_path;
 
+use super::resampling::Resampler;
 use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params, Replay};
 use crate::film::{Film, FilmTile, LightImage, Part, Pyramid, SampleBuffer, Splat};
 use crate::math::Rgb;
@@ -37,13 +38,21 @@ pub(super) const MAX_DEPTH: ParamSpec = ParamSpec {
 pub(super) const RR_DEPTH: ParamSpec = ParamSpec {
     name: "rr_depth",
     about: "vertex (1 is the first hit), counted from either end, from which Russian roulette may end a sub-path",
-    default: ParamDefault::Int(5, 1, 1_000_000),
+    // Long paths are joined from short sub-paths: early roulette saves far more connections than it costs in variance.
+    default: ParamDefault::Int(1, 1, 1_000_000),
 };
 /// See [`MAX_DEPTH`].
 pub(super) const HIDE_EMITTERS: ParamSpec = ParamSpec {
     name: "hide_emitters",
     about: "emitters that the camera sees directly are black",
     default: ParamDefault::Bool(false),
+};
+
+/// See [`MAX_DEPTH`].
+pub(super) const TECHNIQUES: ParamSpec = ParamSpec {
+    name: "techniques",
+    about: "pairs light:eye of vertex numbers that are joined, e.g. all,-0:* (no hits of lights) or *:1 (light tracing)",
+    default: ParamDefault::Techniques("all"),
 };
 
 /// The registry's line.
@@ -60,11 +69,7 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
             about: "how techniques share a path",
             default: ParamDefault::Choice("balance", &["balance", "power"]),
         },
-        ParamSpec {
-            name: "techniques",
-            about: "pairs light:eye of vertex numbers that are joined, e.g. all,-0:* (no hits of lights) or *:1 (light tracing)",
-            default: ParamDefault::Techniques("all"),
-        },
+        TECHNIQUES,
     ],
     unbiased: true,
     refuses: |_| None,
@@ -103,11 +108,13 @@ pub(crate) struct Found {
 
 /// Bidirectional path tracing with any set of techniques; light tracing is one of them.
 pub(super) struct Bidirectional {
-    limits: Limits,
+    pub(super) limits: Limits,
     hide_emitters: bool,
-    weigher: Weigher,
-    /// Some connection with s ≥ 2 and t ≥ 2 is used.
-    connects: bool,
+    pub(super) weigher: Weigher,
+    /// The light sub-path of a pixel is connected to its eye sub-path.
+    pub(super) connects: bool,
+    /// Connections are drawn from many light sub-paths instead.
+    pub(super) resampler: Option<Resampler>,
     /// One for each tile of the film, kept for their memory.
     samples: Vec<SampleBuffer>,
     pyramid: Option<Pyramid>,
@@ -167,10 +174,16 @@ impl Bidirectional {
             limits,
             hide_emitters: params.bool("hide_emitters"),
             connects: techniques.uses_connections(),
-            weigher: Weigher { techniques, heuristic, roulette_from: limits.roulette_from },
+            weigher: Weigher { techniques, heuristic, roulette_from: limits.roulette_from, resampled: None },
+            resampler: None,
             samples: vec![],
             pyramid: None,
         }
+    }
+
+    /// Pixels have light sub-paths of their own.
+    fn uses_light_paths(&self) -> bool {
+        self.connects || self.weigher.techniques.uses_light_image()
     }
 
     /// Light sub-paths of an iteration: one for every pixel of the full film.
@@ -197,7 +210,16 @@ impl Bidirectional {
             }
         };
         let mut lens = LensQueue { queue: &mut worker.lens, found: &mut found, path };
-        light_path::trace(self, iteration.scene, &mut sampler, tracer, &mut worker.light, &mut lens, record);
+        light_path::trace(
+            self,
+            iteration.scene,
+            &mut sampler,
+            tracer,
+            &mut worker.light,
+            Some(&mut lens),
+            record,
+            self.connects,
+        );
     }
 
     /// One eye sub-path, joined with the worker's light sub-path.
@@ -222,6 +244,7 @@ impl Bidirectional {
         let mut hooks = EyeHooks {
             this: self,
             scene,
+            iteration,
             light: &worker.light,
             side: &mut worker.eye,
             cos_leaving: 0.0,
@@ -260,7 +283,7 @@ impl Bidirectional {
         let techniques = &self.weigher.techniques;
         for pixel in 0..tile.pixels() {
             let (x, y) = tile.pixel(pixel);
-            if techniques.uses_light_paths() {
+            if self.uses_light_paths() {
                 self.light_path(iteration, y * scene.film_size[0] + x, worker, &mut tracer, None);
             }
             if techniques.uses_eye_paths() {
@@ -324,10 +347,11 @@ impl Integrator for Bidirectional {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
         let scene = iteration.scene;
         self.weigher.techniques.set_light_paths(self.light_paths(scene));
+        let prepared = self.prepare_resampling(iteration);
         let mut samples = std::mem::take(&mut self.samples);
         samples.resize_with(film.tiles.len(), SampleBuffer::default);
         let this = &*self;
-        let mut harvest = Harvest::default();
+        let mut harvest = Harvest { stats: prepared, ..Harvest::default() };
         let tiles = film
             .tiles
             .par_iter()
@@ -354,9 +378,10 @@ impl Integrator for Bidirectional {
                 tile.commit(samples, light_image.as_ref(), iteration.index);
             });
         });
-        harvest.stats.phases = phases;
+        harvest.stats.phases.merge(&phases);
         film.iterations += 1;
         self.samples = samples;
+        self.learn();
         if let Some(pyramid) = &mut self.pyramid {
             for f in harvest.found.iter().flatten() {
                 pyramid.add((f.s.into(), f.t.into()), (f.x, f.y), f.raw, f.weight);
@@ -375,13 +400,29 @@ impl Integrator for Bidirectional {
         self.pyramid.as_ref()
     }
 
+    fn state(&self) -> Vec<u8> {
+        self.resampler.as_ref().map_or_else(Vec::new, Resampler::state)
+    }
+
+    fn restore(&mut self, iteration: &Iteration, state: &[u8]) -> bool {
+        self.restore_resampling(iteration, state)
+    }
+
     fn replay(&mut self, iteration: &Iteration, (x, y): (u32, u32)) -> Replay {
         let scene = iteration.scene;
         self.weigher.techniques.set_light_paths(self.light_paths(scene));
+        if self.resampler.is_some() {
+            // What an iteration knows comes from those before it.
+            for index in 0..iteration.index {
+                self.prepare_resampling(&Iteration { index, ..*iteration });
+                self.learn();
+            }
+            self.prepare_resampling(iteration);
+        }
         let (mut worker, mut tracer, mut replay) =
             (Worker::new(), Tracer::new(&*scene.query), Replay { pixel: (x, y), ..Replay::default() });
         let mut seen = vec![];
-        if self.weigher.techniques.uses_light_paths() {
+        if self.uses_light_paths() {
             let path = y * scene.film_size[0] + x;
             self.light_path(iteration, path, &mut worker, &mut tracer, Some(&mut replay));
             // One sub-path may fill a packet and more: what has been answered already is among the splats.

@@ -8,9 +8,10 @@
 
 use super::replay::{Contribution, Replay};
 use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params};
+use crate::emit::{DirectSample, Light};
 use crate::film::{Film, FilmTile, Part, SampleBuffer};
 use crate::math::sampler::{PathSampler, Purpose};
-use crate::math::{Rgb, SolidAnglePdf, Vec3};
+use crate::math::{Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Heuristic;
 use crate::path::{Edge, Limits, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, direct_segment, walk};
 use crate::prepared::PreparedScene;
@@ -132,7 +133,8 @@ impl Integrator for PathTracer {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
         let this = &*self;
         let mut phases = Phases::default();
-        let tiles = film.tiles.par_iter_mut();
+        // A tile is much more work than handing it over, and larger pieces leave threads idle at the end of an iteration.
+        let tiles = film.tiles.par_iter_mut().with_max_len(1);
         let tiles = tiles.map_init(SampleBuffer::default, |samples, tile| this.render_tile(iteration, tile, samples));
         let sum = |mut a: RayStats, b: RayStats| {
             a.merge(&b);
@@ -193,7 +195,25 @@ impl Gather<'_> {
         let lights = &self.scene.lights;
         let point = vertex.point;
         let Some((id, chosen)) = lights.pick_from(point.p, vertex.light_normal, u[0]) else { return };
-        let Some(light) = lights.get(id).sample_direct(point.p, [u[1], u[2]]) else { return };
+        // The same twice: the sample of a triangle, by far the most common, stays in registers; one of any kind goes through memory.
+        match lights.get(id) {
+            Light::Triangle(light) => {
+                if let Some(light) = light.sample_direct(point.p, [u[1], u[2]]) {
+                    self.connect(vertex, &light, chosen, tracer);
+                }
+            }
+            light => {
+                if let Some(light) = light.sample_direct(point.p, [u[1], u[2]]) {
+                    self.connect(vertex, &light, chosen, tracer);
+                }
+            }
+        }
+    }
+
+    /// Queues what the light sample `light` brings, which was drawn from a light chosen with probability `chosen`.
+    #[inline(always)]
+    fn connect(&mut self, vertex: &SurfaceVertex, light: &DirectSample, chosen: Pmf, tracer: &mut Tracer) {
+        let point = vertex.point;
         let (value, bsdf_pdf) = vertex.bsdf.eval_and_pdf(vertex.wo, light.wi, Transport::Radiance);
         if value.is_black() {
             return;
@@ -211,7 +231,7 @@ impl Gather<'_> {
         if contribution.is_black() {
             return;
         }
-        let segment = direct_segment(point, &light);
+        let segment = direct_segment(point, light);
         let note = self.note((1, vertex.index as usize + 1), raw, weight, false);
         let carried = Carried { pixel: self.pixel, note, light: contribution };
         let (samples, record) = (&mut *self.samples, &mut self.record);

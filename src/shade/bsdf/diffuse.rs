@@ -1,13 +1,35 @@
 //! Lambert's law: f = ρ/π on the front.
 
 use crate::math::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
-use crate::math::{Rgb, Vec3};
+use crate::math::{Frame, Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
 /// A Lambertian reflector.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Diffuse {
     pub reflectance: Rgb,
+}
+
+/// A Lambertian lobe that is all of a BSDF, in world coordinates. It needs the normal only: a frame is made when a direction is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lambert {
+    /// Shading normal on the side that reflects.
+    pub n: Vec3,
+    pub reflectance: Rgb,
+}
+
+impl Lambert {
+    /// Cosines of both directions, if both are on the side that reflects.
+    #[inline]
+    pub fn cosines(&self, wo: Vec3, wi: Vec3) -> Option<(f32, f32)> {
+        let (cos_o, cos_i) = (wo.dot(self.n), wi.dot(self.n));
+        (cos_o > 0.0 && cos_i > 0.0).then_some((cos_o, cos_i))
+    }
+
+    #[inline]
+    pub fn sample_direction(&self, u: [f32; 3]) -> Vec3 {
+        Frame::from_normal(self.n).to_world(square_to_cosine_hemisphere([u[1], u[2]]))
+    }
 }
 
 impl Diffuse {

@@ -7,7 +7,7 @@ impl Bsdf {
     #[inline]
     pub fn is_black(&self) -> bool {
         match &self.lambert {
-            Some(diffuse) => diffuse.reflectance.is_black(),
+            Some(lambert) => lambert.reflectance.is_black(),
             None => self.leaves.is_empty(),
         }
     }

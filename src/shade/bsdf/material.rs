@@ -1,5 +1,6 @@
 //! Materials of a scene: descriptions checked and turned into trees, once, and what can be known of them without a point.
 
+use super::diffuse::Lambert;
 use super::link::ROOT;
 use super::microfacet::Microfacets;
 use super::node::{Node, PrincipledNode, Resolver, Roughness};
@@ -8,7 +9,7 @@ use super::{Bsdf, MAX_LEAVES, MAX_LINKS};
 use crate::math::{Frame, Rgb, Vec3};
 use crate::scene::{BsdfDesc, BsdfId, BsdfKind, Diagnostic, Diagnostics, PrincipledDesc, RoughnessDesc, ScalarDesc};
 use crate::shade::SurfacePoint;
-use crate::shade::texture::{ScalarTexture, TextureSet};
+use crate::shade::texture::{ColorTexture, ScalarTexture, TextureSet};
 
 /// What a material can do anywhere on a surface, known before any point is looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +49,14 @@ impl Features {
     }
 }
 
+/// One side of a material that is constant and Lambertian.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    reflectance: Rgb,
+    /// What the normal is multiplied by to be on the side that reflects: 1 on a back that does not, which nothing can then be seen from.
+    turn: f32,
+}
+
 /// A material with its textures, shared by many points.
 #[derive(Debug)]
 pub struct Material {
@@ -55,9 +64,26 @@ pub struct Material {
     features: Features,
     /// Constant and zero everywhere: it scatters nothing.
     black: bool,
+    /// Front and back, where one constant Lambertian lobe a side is all there is.
+    lambert: Option<[Side; 2]>,
 }
 
 impl Material {
+    fn new(part: Part) -> Material {
+        let constant = |node: &Node| match node {
+            Node::Diffuse { reflectance: ColorTexture::Constant(reflectance) } => Some(*reflectance),
+            _ => None,
+        };
+        let side = |reflectance, turn| Side { reflectance, turn };
+        let lambert = match &part.node {
+            Node::TwoSided { front, back } => {
+                constant(front).zip(constant(back)).map(|(f, b)| [side(f, 1.0), side(b, -1.0)])
+            }
+            node => constant(node).map(|front| [side(front, 1.0), side(Rgb::BLACK, 1.0)]),
+        };
+        Material { node: part.node, features: part.features, black: part.black, lambert }
+    }
+
     /// Looks up every texture at `point` for a walk that arrived from `wo`.
     #[inline]
     pub fn resolve(&self, point: &SurfacePoint, wo: Vec3) -> Bsdf {
@@ -70,6 +96,18 @@ impl Material {
     #[inline]
     pub fn resolve_into(&self, bsdf: &mut Bsdf, point: &SurfacePoint, wo: Vec3) {
         bsdf.clear(point);
+        if let Some(sides) = &self.lambert {
+            // By the bit of the sign: which side is seen is hard to guess, so there is no branch.
+            let cos = wo.dot(point.frame.n);
+            let Side { reflectance, turn } = sides[(cos.to_bits() >> 31) as usize];
+            bsdf.lambert = Some(Lambert { n: point.frame.n * turn, reflectance });
+            return;
+        }
+        self.resolve_general(bsdf, point, wo);
+    }
+
+    fn resolve_general(&self, bsdf: &mut Bsdf, point: &SurfacePoint, wo: Vec3) {
+        bsdf.frame = point.frame;
         let mut node = &self.node;
         let mut only_side = None;
         if self.features.opaque() {
@@ -83,7 +121,7 @@ impl Material {
                 }
             }
             if let Node::Diffuse { reflectance } = node {
-                bsdf.set_lambert(reflectance.eval(point), behind);
+                bsdf.lambert = (!behind).then(|| Lambert { n: bsdf.frame.n, reflectance: reflectance.eval(point) });
                 return;
             }
             only_side = Some(usize::from(behind));
@@ -140,11 +178,7 @@ impl MaterialSet {
 }
 
 fn default_material() -> Material {
-    Material {
-        node: Node::lambert(Rgb::grey(0.5)),
-        features: Features { smooth: true, ..Features::default() },
-        black: false,
-    }
+    Material::new(Part::leaf(Node::lambert(Rgb::grey(0.5)), smooth()))
 }
 
 /// Trees deeper than this are taken for circles.
@@ -200,7 +234,7 @@ impl Builder<'_> {
         if part.links > MAX_LINKS {
             return Err(format!("it nests {} frames; at most {MAX_LINKS} are supported", part.links));
         }
-        Ok(Material { node: part.node, features: part.features, black: part.black })
+        Ok(Material::new(part))
     }
 
     fn part(&mut self, id: BsdfId, depth: u32) -> Result<Part, String> {

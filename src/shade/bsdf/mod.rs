@@ -28,7 +28,7 @@ pub use material::{Features, Material, MaterialSet};
 use super::{SurfacePoint, Transport};
 use crate::math::{Frame, Rgb, SolidAnglePdf, Vec3};
 use arrayvec::ArrayVec;
-use diffuse::Diffuse;
+use diffuse::Lambert;
 use link::{Link, ROOT};
 use lobe::{DeltaSample, Lobe, LobeSample};
 
@@ -48,6 +48,8 @@ pub struct BsdfSample {
     pub pdf: SolidAnglePdf,
     /// Of a delta event: the discrete probability of the reverse event (`wo` given `wi`); otherwise unused.
     pub pdf_reverse_delta: SolidAnglePdf,
+    /// Of a delta event drawn for radiance: the value of the reverse event for importance; otherwise unused.
+    pub reverse_delta: Rgb,
     /// The direction is one of finitely many.
     pub delta: bool,
     /// The ray goes straight through as if nothing were there (mask, null).
@@ -85,8 +87,9 @@ pub struct Bsdf {
     links: ArrayVec<Link, MAX_LINKS>,
     /// 1 / sum of the picks of the active leaves, seen from the front and from the back.
     pick_scale: [f32; 2],
-    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited and `leaves` stay empty.
-    lambert: Option<Diffuse>,
+    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited: `leaves` stay empty and `frame` is
+    /// left as it was. (Copying it would read in one piece what has just been written in several, and processors stall on that.)
+    lambert: Option<Lambert>,
 }
 
 /// Index into the arrays of two sides.
@@ -112,19 +115,10 @@ impl Bsdf {
     #[inline]
     fn clear(&mut self, point: &SurfacePoint) {
         self.ng = point.ng;
-        self.frame = point.frame;
         self.leaves.clear();
         self.links.clear();
         self.pick_scale = [0.0; 2];
         self.lambert = None;
-    }
-
-    /// A single Lambertian lobe, if it is on the viewer's side.
-    #[inline]
-    fn set_lambert(&mut self, reflectance: Rgb, behind: bool) {
-        if !behind {
-            self.lambert = Some(Diffuse { reflectance });
-        }
     }
 
     /// Normalises the choice of lobes; called once all leaves are in.
@@ -158,16 +152,15 @@ impl Bsdf {
     #[inline]
     pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
         match &self.lambert {
-            Some(diffuse) => {
-                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
-                if cos_o <= 0.0 || cos_i <= 0.0 {
+            Some(lambert) => {
+                let Some((cos_o, cos_i)) = lambert.cosines(wo, wi) else {
                     return (Rgb::BLACK, SolidAnglePdf(0.0));
-                }
+                };
                 let pdf = cos_i * std::f32::consts::FRAC_1_PI;
                 let value = match mode {
-                    Transport::Radiance => diffuse.reflectance * pdf,
+                    Transport::Radiance => lambert.reflectance * pdf,
                     Transport::Importance => {
-                        diffuse.reflectance * (cos_o * std::f32::consts::FRAC_1_PI * self.geometric_ratio(wo, wi))
+                        lambert.reflectance * (cos_o * std::f32::consts::FRAC_1_PI * self.geometric_ratio(wo, wi))
                     }
                 };
                 (value, SolidAnglePdf(pdf))
@@ -198,9 +191,8 @@ impl Bsdf {
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> SolidAnglePdf {
         match &self.lambert {
-            Some(_) => {
-                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
-                SolidAnglePdf(if cos_o > 0.0 && cos_i > 0.0 { cos_i * std::f32::consts::FRAC_1_PI } else { 0.0 })
+            Some(lambert) => {
+                SolidAnglePdf(lambert.cosines(wo, wi).map_or(0.0, |(_, cos_i)| cos_i * std::f32::consts::FRAC_1_PI))
             }
             None => SolidAnglePdf(self.pdf_local(self.frame.to_local(wo), self.frame.to_local(wi))),
         }
@@ -211,10 +203,10 @@ impl Bsdf {
     #[inline]
     pub fn pdf_both(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> (SolidAnglePdf, SolidAnglePdf) {
         match &self.lambert {
-            Some(_) => {
-                let (cos_o, cos_i) = (wo.dot(self.frame.n), wi.dot(self.frame.n));
-                let inside = if cos_o > 0.0 && cos_i > 0.0 { std::f32::consts::FRAC_1_PI } else { 0.0 };
-                (SolidAnglePdf(cos_i * inside), SolidAnglePdf(cos_o * inside))
+            Some(lambert) => {
+                let (cos_o, cos_i) = lambert.cosines(wo, wi).unwrap_or((0.0, 0.0));
+                let scale = std::f32::consts::FRAC_1_PI;
+                (SolidAnglePdf(cos_i * scale), SolidAnglePdf(cos_o * scale))
             }
             None => {
                 let (o, i) = (self.frame.to_local(wo), self.frame.to_local(wi));
@@ -246,10 +238,7 @@ impl Bsdf {
     #[inline]
     pub fn sample(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
         match &self.lambert {
-            Some(diffuse) => {
-                let local = diffuse.sample_direction(Vec3::new(0.0, 0.0, wo.dot(self.frame.n)), u)?;
-                self.smooth_sample(wo, self.frame.to_world(local), 1.0, mode)
-            }
+            Some(lambert) => self.smooth_sample(wo, lambert.sample_direction(u), 1.0, mode),
             None => self.sample_general(wo, u, mode),
         }
     }
@@ -262,6 +251,7 @@ impl Bsdf {
             value,
             pdf,
             pdf_reverse_delta: SolidAnglePdf(0.0),
+            reverse_delta: Rgb::BLACK,
             delta: false,
             passes_through: false,
             eta,
@@ -320,12 +310,16 @@ impl Bsdf {
         let (o, i) = (self.frame.to_local(wo), frame.to_world(event.b));
         let wi = if event.passes_through { -wo } else { self.frame.to_world(i).normalize() };
         let mut value = event.value * leaf.weight;
+        let mut reverse_value = value;
         if !event.passes_through {
             let inside = match mode {
                 Transport::Radiance => link::enter(&self.links, leaf.link, o, i)?,
                 Transport::Importance => link::enter(&self.links, leaf.link, i, o)?,
             };
             value *= inside.shadowing;
+            // Walked from `wi` to `wo`: no η², and the cosines exchanged.
+            let cosines = self.geometric_ratio(wi, wo) * event.b.z.abs() / a.z.abs();
+            reverse_value = value * (event.eta * event.eta * cosines);
             if mode == Transport::Importance {
                 let cos = event.b.z.abs();
                 if cos == 0.0 {
@@ -340,6 +334,7 @@ impl Bsdf {
             value,
             pdf: SolidAnglePdf(share * event.pdf),
             pdf_reverse_delta: SolidAnglePdf(reverse * event.pdf_reverse),
+            reverse_delta: reverse_value,
             delta: true,
             passes_through: event.passes_through,
             eta: event.eta,
@@ -350,8 +345,8 @@ impl Bsdf {
     /// whichever side the point is reached.
     #[inline]
     pub fn albedo(&self) -> Rgb {
-        if let Some(diffuse) = &self.lambert {
-            return diffuse.reflectance;
+        if let Some(lambert) = &self.lambert {
+            return lambert.reflectance;
         }
         let seen =
             |s: usize| -> Rgb { self.leaves.iter().filter(|l| l.active[s]).map(|l| l.lobe.albedo() * l.weight).sum() };
@@ -362,7 +357,7 @@ impl Bsdf {
     /// True if a connection to this point can carry light: some lobe is not a delta.
     #[inline]
     pub fn connectable(&self) -> bool {
-        self.lambert.is_some() || self.leaves.iter().any(|leaf| leaf.lobe.is_smooth())
+        self.lambert.is_some_and(|l| !l.reflectance.is_black()) || self.leaves.iter().any(|leaf| leaf.lobe.is_smooth())
     }
 }
 

@@ -1,0 +1,215 @@
+//! The few points of a fixed set that are nearest to a place on a surface, on its own side.
+//!
+//! The answer is wanted for every vertex of every sub-path, so it is looked up and not searched: space is cut into cells, each with
+//! one slot for each of six directions that a surface may face, and a slot is searched (from the middle of its cell) when it is
+//! first asked for. The answer is thus a function of the cell and the facing alone: the same for any order of questions.
+//!
+//! Points whose surface faces another way count as far: a point on the other side of a thin wall is near, but sees another room.
+
+use crate::math::Vec3;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Most neighbours that are found.
+pub const MOST: usize = 3;
+/// Cells along the longest side of the box around the points.
+const CELLS: usize = 96;
+/// Bits of a point's number; all of them set: no point.
+const BITS: u32 = 21;
+const NOBODY: u64 = (1 << BITS) - 1;
+/// Slots hold this bit when they have been searched.
+const KNOWN: u64 = 1 << 63;
+
+/// A fixed set of oriented points.
+#[derive(Debug)]
+pub struct NearestPoints {
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    /// For each facing: a left-balanced kd-tree of the points that face that way, as a list of numbers.
+    trees: [Vec<u32>; 6],
+    lo: Vec3,
+    per_cell: f32,
+    cells: [usize; 3],
+    slots: Vec<AtomicU64>,
+}
+
+/// Which of ±x, ±y, ±z `n` is nearest to.
+fn facing(n: Vec3) -> usize {
+    let a = n.abs();
+    let axis = if a.x >= a.y && a.x >= a.z {
+        0
+    } else if a.y >= a.z {
+        1
+    } else {
+        2
+    };
+    2 * axis + usize::from(n[axis] < 0.0)
+}
+
+fn direction(facing: usize) -> Vec3 {
+    let sign = if facing % 2 == 0 { 1.0 } else { -1.0 };
+    [Vec3::X, Vec3::Y, Vec3::Z][facing / 2] * sign
+}
+
+/// Orders `numbers` so that the middle of every range splits it along the axis of its depth.
+fn build_tree(points: &[Vec3], numbers: &mut [u32], axis: usize) {
+    if numbers.len() <= 1 {
+        return;
+    }
+    let middle = numbers.len() / 2;
+    // Ties are broken by number: floors are full of equal coordinates.
+    numbers.select_nth_unstable_by(middle, |&a, &b| {
+        points[a as usize][axis].total_cmp(&points[b as usize][axis]).then(a.cmp(&b))
+    });
+    let (left, right) = numbers.split_at_mut(middle);
+    build_tree(points, left, (axis + 1) % 3);
+    build_tree(points, &mut right[1..], (axis + 1) % 3);
+}
+
+/// The nearest so far, sorted by distance.
+struct Best {
+    distance2: [f32; MOST],
+    number: [u64; MOST],
+}
+
+impl Best {
+    fn offer(&mut self, distance2: f32, number: u32) {
+        // Equal distances are ordered by number, so that the answer does not depend on the tree.
+        let before = |i: usize, best: &Best| (distance2, u64::from(number)) < (best.distance2[i], best.number[i]);
+        let Some(at) = (0..MOST).find(|&i| before(i, self)) else { return };
+        for i in (at + 1..MOST).rev() {
+            self.distance2[i] = self.distance2[i - 1];
+            self.number[i] = self.number[i - 1];
+        }
+        self.distance2[at] = distance2;
+        self.number[at] = u64::from(number);
+    }
+}
+
+fn search(points: &[Vec3], tree: &[u32], axis: usize, p: Vec3, best: &mut Best) {
+    let Some((left, rest)) = tree.split_at_checked(tree.len() / 2) else { return };
+    let Some((&middle, right)) = rest.split_first() else { return };
+    let q = points[middle as usize];
+    best.offer(p.distance_squared(q), middle);
+    let offset = p[axis] - q[axis];
+    let (near, far) = if offset < 0.0 { (left, right) } else { (right, left) };
+    search(points, near, (axis + 1) % 3, p, best);
+    if offset * offset <= best.distance2[MOST - 1] {
+        search(points, far, (axis + 1) % 3, p, best);
+    }
+}
+
+impl NearestPoints {
+    /// An index of `points` with the unit normals of their surfaces' sides. At most 2²¹ − 1 points are indexed; later ones are
+    /// never found.
+    pub fn new(points: Vec<Vec3>, normals: Vec<Vec3>) -> NearestPoints {
+        let most = points.len().min(normals.len()).min(NOBODY as usize);
+        let trees = std::array::from_fn(|f| {
+            let mut tree: Vec<u32> =
+                (0..most as u32).filter(|&i| normals[i as usize].dot(direction(f)) > 0.2).collect();
+            build_tree(&points, &mut tree, 0);
+            tree
+        });
+        let lo = points.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+        let hi = points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+        let size = if points.is_empty() { Vec3::ONE } else { hi - lo };
+        let per_cell = CELLS as f32 / size.max_element().max(f32::MIN_POSITIVE);
+        let cells = (size * per_cell).to_array().map(|s| (s.ceil() as usize).clamp(1, CELLS));
+        let slots = (0..cells.iter().product::<usize>() * 6).map(|_| AtomicU64::new(0)).collect();
+        NearestPoints { points, normals, trees, lo, per_cell, cells, slots }
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// True if there are no points.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Positions.
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// Normals.
+    pub fn normals(&self) -> &[Vec3] {
+        &self.normals
+    }
+
+    /// Numbers of the points nearest to `p` (up to the size of a cell) among those whose surface faces about as `n` does, nearest
+    /// first; fewer than [`MOST`] where there are not so many.
+    #[inline]
+    pub fn find(&self, p: Vec3, n: Vec3) -> impl Iterator<Item = usize> + use<> {
+        let cell = ((p - self.lo) * self.per_cell).to_array();
+        // Negative numbers and NaN become zero.
+        let cell: [usize; 3] = std::array::from_fn(|i| (cell[i] as usize).min(self.cells[i] - 1));
+        let facing = facing(n);
+        let slot = &self.slots[((cell[2] * self.cells[1] + cell[1]) * self.cells[0] + cell[0]) * 6 + facing];
+        let mut found = slot.load(Ordering::Relaxed);
+        if found == 0 {
+            found = self.search(cell, facing);
+            // Whoever else searched found the same.
+            slot.store(found, Ordering::Relaxed);
+        }
+        (0..MOST as u32).map(move |i| found >> (i * BITS) & NOBODY).filter(|&n| n != NOBODY).map(|n| n as usize)
+    }
+
+    #[cold]
+    fn search(&self, cell: [usize; 3], facing: usize) -> u64 {
+        let middle = self.lo + Vec3::from(cell.map(|c| c as f32 + 0.5)) / self.per_cell;
+        let mut best = Best { distance2: [f32::INFINITY; MOST], number: [NOBODY; MOST] };
+        search(&self.points, &self.trees[facing], 0, middle, &mut best);
+        best.number.iter().zip(0..).fold(KNOWN, |slot, (n, i)| slot | n << (i * BITS))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashRng;
+
+    #[test]
+    fn finds_what_brute_force_finds() {
+        let mut rng = HashRng::new(1, 2, 3, 4);
+        // Many points on planes, with equal coordinates.
+        let points: Vec<Vec3> = (0..3000)
+            .map(|i| {
+                let [x, y, z, _] = rng.next_4();
+                Vec3::new(x * 5.0, if i % 2 == 0 { 0.0 } else { y * 3.0 }, if i % 3 == 0 { 1.0 } else { z })
+            })
+            .collect();
+        let normals: Vec<Vec3> = (0..3000)
+            .map(|_| {
+                let [x, y, z, _] = rng.next_4();
+                (Vec3::new(x, y, z) - 0.5).normalize_or(Vec3::Z)
+            })
+            .collect();
+        let index = NearestPoints::new(points.clone(), normals.clone());
+        for _ in 0..500 {
+            let [x, y, z, w] = rng.next_4();
+            let (p, f) = (Vec3::new(x * 6.0 - 0.5, y * 4.0 - 0.5, z * 2.0 - 0.5), (w * 6.0) as usize);
+            let cell = ((p - index.lo) * index.per_cell).to_array();
+            let cell: [usize; 3] = std::array::from_fn(|i| (cell[i] as usize).min(index.cells[i] - 1));
+            let middle = index.lo + Vec3::from(cell.map(|c| c as f32 + 0.5)) / index.per_cell;
+            let mut all: Vec<usize> = (0..3000).filter(|&i| normals[i].dot(direction(f)) > 0.2).collect();
+            all.sort_by(|&a, &b| {
+                let d = |i: usize| middle.distance_squared(points[i]);
+                d(a).total_cmp(&d(b)).then(a.cmp(&b))
+            });
+            for _ in 0..2 {
+                assert_eq!(index.find(p, direction(f)).collect::<Vec<_>>(), all[..MOST]);
+            }
+        }
+    }
+
+    #[test]
+    fn few_points_or_none() {
+        let none = NearestPoints::new(vec![], vec![]);
+        assert_eq!(none.find(Vec3::ONE, Vec3::X).count(), 0);
+        let one = NearestPoints::new(vec![Vec3::ONE], vec![Vec3::Y]);
+        assert_eq!(one.find(Vec3::splat(f32::NAN), Vec3::Y).collect::<Vec<_>>(), [0]);
+        assert_eq!(one.find(Vec3::splat(1e9), Vec3::NEG_Y).count(), 0);
+    }
+}

@@ -1,0 +1,101 @@
+//! What the command line shows of bidirectional techniques, from outside: the pyramid, replays, switched off techniques.
+
+mod common;
+
+use common::Sandbox;
+use lightsieve::image::{Encoding, Image, read_image};
+
+fn image(sandbox: &Sandbox, name: &str) -> Image {
+    read_image(&sandbox.path(name), Encoding::Auto).unwrap()
+}
+
+fn mean(image: &Image) -> f64 {
+    let all = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
+    all.map(|(x, y)| f64::from(image.rgb(x, y).luminance())).sum::<f64>() / f64::from(image.width * image.height)
+}
+
+#[test]
+fn a_pyramid_is_written() {
+    let sandbox = Sandbox::new();
+    sandbox
+        .run("render scene.xml -i bdpt --spp 4 --seed 3 -o a.exr --pyramid techniques --pyramid-depth 5 --quiet")
+        .expect(0, &[]);
+    // All path lengths of the scene are in the pyramid: the main layer of what is weighted is the picture.
+    let (picture, weighted) = (image(&sandbox, "a.exr"), image(&sandbox, "techniques/weighted.exr"));
+    assert!((mean(&picture) / mean(&weighted) - 1.0).abs() < 1e-5);
+    // By themselves, all techniques that make a path make it whole.
+    assert!(mean(&image(&sandbox, "techniques/raw.exr")) > 1.5 * mean(&picture));
+    let sheet = image(&sandbox, "techniques/sheet.png");
+    assert!(sheet.width > 2 * 6 * 16 && sheet.height > 5 * 16);
+    let bytes = sandbox.read("techniques/weighted.exr");
+    for layer in ["depth1_s0_t2.R", "depth2_s1_t2.G", "depth5_s5_t1.B"] {
+        assert!(bytes.windows(layer.len()).any(|w| w == layer.as_bytes()), "{layer}");
+    }
+}
+
+#[test]
+fn who_has_no_techniques_has_no_pyramid() {
+    let sandbox = Sandbox::new();
+    sandbox.run("render scene.xml -i path --spp 1 --pyramid p").expect(2, &["path has no techniques"]);
+    sandbox.run("render scene.xml -i bdpt --spp 1 --pyramid p --pyramid-depth 0").expect(2, &["pyramid-depth"]);
+}
+
+#[test]
+fn a_sample_is_replayed() {
+    let sandbox = Sandbox::new();
+    for integrator in ["path", "light", "bdpt"] {
+        let run = sandbox.run(&format!("replay scene.xml -i {integrator} --pixel 5,11 --iteration 2 --seed 7"));
+        let text = run.expect(0, &[]).stdout;
+        let walk = if integrator == "light" { "y1 at" } else { "z1 at" };
+        for part in [walk, "throughput", "contributions", "sum of what is visible"] {
+            assert!(text.contains(part), "{integrator}: {part} in {text}");
+        }
+        // Only bidirectional weights have a longer definition, and this light sub-path is nowhere seen.
+        assert_eq!(text.contains("by definition"), integrator == "bdpt");
+    }
+    sandbox.run("replay scene.xml --pixel 16,0").expect(2, &["16,0 is not in the picture"]);
+    sandbox.run("replay scene.xml --pixel 1,2,3").expect(2, &["column and row"]);
+    sandbox.run("replay scene.xml --pixel 1,1 -i bdtp").expect(2, &["did you mean \"bdpt\""]);
+}
+
+/// A path tracer's sample depends on its own pixel alone: what is replayed is what was rendered.
+#[test]
+fn a_replay_is_the_rendered_sample() {
+    let sandbox = Sandbox::new();
+    sandbox.write_box_with("scene.xml", "<film type=\"hdrfilm\">", "<film type=\"hdrfilm\"><rfilter type=\"box\"/>");
+    for (integrator, params) in [("path", ""), ("bdpt", "-p techniques=-*:1")] {
+        let options = format!("-i {integrator} {params} --seed 4");
+        sandbox.run(&format!("render scene.xml {options} --spp 1 -o a.pfm --quiet")).expect(0, &[]);
+        let text = sandbox.run(&format!("replay scene.xml {options} --pixel 9,6")).expect(0, &[]).stdout;
+        let sum = text.lines().last().unwrap().rsplit_once('(').unwrap().1.trim_end_matches(')').to_owned();
+        let sum: Vec<f32> = sum.split_whitespace().map(|v| v.parse().unwrap()).collect();
+        let rendered = image(&sandbox, "a.pfm").rgb(9, 6).to_array();
+        for (a, b) in sum.iter().zip(rendered) {
+            assert!((a - b).abs() <= 1e-5 * b.abs(), "{integrator}: {sum:?} {rendered:?}");
+        }
+    }
+}
+
+#[test]
+fn techniques_are_switched_by_name() {
+    let sandbox = Sandbox::new();
+    sandbox.run("render scene.xml -i bdpt --spp 2 -p techniques=*:1 -o a.pfm --quiet").expect(0, &[]);
+    sandbox.run("render scene.xml -i light --spp 2 -o b.pfm --quiet").expect(0, &[]);
+    assert_eq!(sandbox.read("a.pfm"), sandbox.read("b.pfm"));
+    sandbox.run("render scene.xml -i bdpt -p techniques=1-2").expect(2, &["techniques = 1-2", "light:eye"]);
+}
+
+#[test]
+fn what_light_tracing_cannot_see_is_said() {
+    let sandbox = Sandbox::new();
+    sandbox.write_box_with(
+        "scene.xml",
+        "<shape type=\"rectangle\">",
+        "<shape type=\"sphere\"><float name=\"radius\" value=\"0.3\"/><bsdf type=\"dielectric\"/></shape><shape type=\"rectangle\">",
+    );
+    sandbox
+        .run("render scene.xml -i light --spp 1 -o a.pfm")
+        .expect(0, &["warning: light: what the camera sees in mirrors"]);
+    let other = sandbox.run("render scene.xml -i bdpt --spp 1 -o a.pfm").expect(0, &[]);
+    assert!(!other.stderr.contains("warning"), "{}", other.stderr);
+}

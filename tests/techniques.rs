@@ -1,0 +1,192 @@
+//! Bidirectional techniques one by one: each makes the same picture of every path length, together they make the picture, and the
+//! light image does not depend on threads, windows or interruptions.
+
+#[path = "scenes/gallery.rs"]
+mod gallery;
+mod scenes;
+
+use gallery::{GALLERY, exhibit};
+use lightsieve::film::Film;
+use lightsieve::film::pyramid::Side;
+use lightsieve::integrators::{Integrator, IntegratorSpec, Params, bdpt, light};
+use lightsieve::math::Rgb;
+use lightsieve::prepared::{Features, PreparedScene};
+use lightsieve::ray::Backend;
+use lightsieve::render::{Budget, render};
+use rayon::prelude::*;
+use scenes::{RENDERS, SIGNIFICANCE, chance, prepare};
+use std::sync::atomic::AtomicBool;
+
+fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Integrator> {
+    let mut values = Params::defaults(spec);
+    for (name, value) in params {
+        values.set(name, value).unwrap();
+    }
+    (spec.build)(&values)
+}
+
+fn run(scene: &PreparedScene, integrator: &mut dyn Integrator, spp: u64, seed: u64) -> Film {
+    let mut film = Film::new(scene.window);
+    let budget = Budget { iterations: Some(spp), time: None };
+    render(scene, integrator, &mut film, seed, budget, &AtomicBool::new(false), |_, _, _| {});
+    assert_eq!(film.non_finite(), (0, vec![]));
+    film
+}
+
+/// Longest paths looked at.
+const EDGES: usize = 4;
+/// Every picture is compared in so many squares along each side.
+const BLOCKS: usize = 2;
+
+fn blocks(pixels: &[Rgb], [width, height]: [u32; 2]) -> Vec<f64> {
+    let mut sums = vec![0.0; BLOCKS * BLOCKS];
+    for (i, p) in pixels.iter().enumerate() {
+        let (x, y) = (i % width as usize, i / width as usize);
+        sums[y * BLOCKS / height as usize * BLOCKS + x * BLOCKS / width as usize] += f64::from(p.luminance());
+    }
+    sums
+}
+
+/// Means and their variances over renders, for each block.
+fn moments(renders: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let n = renders.len() as f64;
+    (0..renders[0].len())
+        .map(|b| {
+            let mean = renders.iter().map(|r| r[b]).sum::<f64>() / n;
+            (mean, renders.iter().map(|r| (r[b] - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)))
+        })
+        .collect()
+}
+
+#[test]
+fn each_technique_alone_makes_the_same_picture() {
+    let mut compared = 0;
+    for name in GALLERY {
+        let scene = prepare(exhibit(name), Backend::default_available(), None);
+        // Through delta events only some techniques make a path.
+        if scene.features.contains(Features::SPECULAR) || scene.features.contains(Features::MASKS) {
+            continue;
+        }
+        let renders: Vec<_> = (0..RENDERS)
+            .into_par_iter()
+            .map(|seed| {
+                let mut integrator = build(&bdpt::SPEC, &[("max_depth", &EDGES.to_string()), ("rr_depth", "3")]);
+                assert!(integrator.keep_pyramid(scene.window, EDGES));
+                run(&scene, &mut *integrator, 512, 40 + seed);
+                integrator.pyramid().unwrap().clone()
+            })
+            .collect();
+        let size = renders[0].size();
+        for k in 2..=EDGES {
+            let of = |s: usize| -> Vec<(f64, f64)> {
+                let all: Vec<_> = renders.iter().map(|p| blocks(&p.picture((k, s), Side::Raw), size)).collect();
+                moments(&all)
+            };
+            // Hits of delta lights do not happen, and hits of the sun hardly ever.
+            let first = usize::from(scene.features.contains(Features::DELTA_LIGHTS) || name == "sunsky");
+            let reference = of(1);
+            for s in (first..=k).filter(|&s| s != 1) {
+                // Light that is focused beside the cube's foot and connected across its corner: 1 / d² by itself has no
+                // variance to judge by.
+                if name == "delta-lights" && s == 2 && k == 4 {
+                    continue;
+                }
+                for (b, (a, r)) in of(s).into_iter().zip(&reference).enumerate() {
+                    // A mean that hangs on a few lucky paths has no honest error either.
+                    if a.1.sqrt() > 0.05 * r.0 {
+                        continue;
+                    }
+                    let freedom = (RENDERS - 1) as f64;
+                    let p = chance(a, *r, (freedom, freedom), 0.0);
+                    // Some hundred comparisons.
+                    assert!(
+                        p > SIGNIFICANCE / 300.0,
+                        "{name}: ({s}, {}) block {b}: {} ± {} instead of {} ± {}, p = {p:e}",
+                        k + 1 - s,
+                        a.0,
+                        a.1.sqrt(),
+                        r.0,
+                        r.1.sqrt()
+                    );
+                    compared += 1;
+                }
+            }
+        }
+    }
+    assert!(compared > 120, "{compared}");
+}
+
+#[test]
+fn the_weighted_pyramid_sums_to_the_picture() {
+    for name in GALLERY {
+        let scene = prepare(exhibit(name), Backend::default_available(), None);
+        let mut integrator = build(&bdpt::SPEC, &[("max_depth", "7")]);
+        integrator.keep_pyramid(scene.window, 7);
+        let film = run(&scene, &mut *integrator, 8, 1);
+        let pyramid = integrator.pyramid().unwrap();
+        let mut sum = vec![Rgb::BLACK; film.mean().len()];
+        for technique in pyramid.techniques() {
+            sum.iter_mut().zip(pyramid.picture(technique, Side::Weighted)).for_each(|(a, b)| *a += b);
+        }
+        for (a, b) in sum.iter().zip(film.mean()) {
+            for c in 0..3 {
+                assert!((a[c] - b[c]).abs() <= 1e-4 * b[c].abs() + 1e-6, "{name}: {a:?} {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_light_image_is_the_same_bits_for_any_number_of_threads() {
+    for spec in [&bdpt::SPEC, &light::SPEC] {
+        for (name, crop) in [("room", None), ("lens", Some([1, 2, 5, 4])), ("environment", None)] {
+            let scene = prepare(exhibit(name), Backend::default_available(), crop);
+            let mean = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| run(&scene, &mut *build(spec, &[]), 5, 9).mean())
+            };
+            let one = mean(1);
+            for threads in [2, 7] {
+                assert!(mean(threads) == one, "{} {name} {threads}", spec.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_crop_of_the_light_image_is_the_same_bits() {
+    for spec in [&bdpt::SPEC, &light::SPEC] {
+        for name in ["room", "lens", "environment", "bumps"] {
+            let whole = prepare(exhibit(name), Backend::default_available(), None);
+            let window = [2, 1, 4, 5];
+            let part = prepare(exhibit(name), Backend::default_available(), Some(window));
+            let [all, some] = [&whole, &part].map(|scene| run(scene, &mut *build(spec, &[]), 6, 3).mean());
+            let width = whole.window[2];
+            for y in 0..window[3] {
+                for x in 0..window[2] {
+                    let (a, b) =
+                        (all[((y + window[1]) * width + x + window[0]) as usize], some[(y * window[2] + x) as usize]);
+                    assert_eq!(a, b, "{} {name} {x} {y}", spec.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn switched_off_techniques_find_nothing_and_the_others_take_over() {
+    let scene = prepare(exhibit("room"), Backend::default_available(), None);
+    let mean = |techniques: &str| {
+        let mut integrator = build(&bdpt::SPEC, &[("techniques", techniques), ("max_depth", "4")]);
+        integrator.keep_pyramid(scene.window, 4);
+        let film = run(&scene, &mut *integrator, 512, 2);
+        let off = integrator.pyramid().unwrap().picture((3, 2), Side::Raw);
+        let sum: f64 = film.mean().iter().map(|p| f64::from(p.luminance())).sum();
+        (sum, off.iter().any(|p| !p.is_black()))
+    };
+    let (all, found) = mean("all");
+    assert!(found);
+    let (without, found) = mean("-2:2");
+    assert!(!found);
+    assert!((without / all - 1.0).abs() < 0.02, "{without} {all}");
+}
