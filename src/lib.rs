@@ -3,7 +3,7 @@
 //! The library is a row of rooms; each imports only rooms that stand before it in this list (a test enforces it):
 //!
 //! ```text
-//! math → image → scene → load → ray → shade → emit → prepared → spatial → path → mis → film → integrators → render → app
+//! math → image → scene → load → ray → shade → emit → prepared → spatial → path → mis → film → integrators → render → measure → app
 //! ```
 //!
 //! Data flows one way and can be read in `render::driver`:
@@ -31,4 +31,5 @@ pub mod mis;
 pub mod film;
 pub mod integrators;
 pub mod render;
+pub mod measure;
 pub mod app;

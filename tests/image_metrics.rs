@@ -1,10 +1,12 @@
-//! Measures of error against values computed elsewhere: the simple ones with numpy 2 in f64, ꟻLIP with NVIDIA's
+//! Measures of error against values computed elsewhere: the simple ones with numpy 2 in f64 (and scipy), ꟻLIP with NVIDIA's
 //! flip-evaluator 1.7 (`evaluate(…, 'LDR', inputsRGB=False)` and `evaluate(…, 'HDR')`, default viewer). All on pictures of
 //! 64 x 48 pixels made by the formulas below, which use only operations that are exact or rounded once.
 
 use lightsieve::image::flip::{hdr_flip, ldr_flip};
 use lightsieve::image::metrics::pixel_errors;
+use lightsieve::image::z_test::z_test;
 use lightsieve::image::{Image, Pixels, SizeMismatch, compare};
+use lightsieve::measure::reference::OwnError;
 
 const WIDTH: usize = 64;
 const HEIGHT: usize = 48;
@@ -134,6 +136,23 @@ fn pixel_errors_agree_with_numpy() {
     close("relmse", r.relmse, 84438.44264633497);
     close("relmse_trimmed", r.relmse_trimmed, 17985.197370183727);
     close("mean_ratio", r.mean_ratio, 2.442775900206148);
+}
+
+#[test]
+fn errors_in_units_of_their_spread_agree_with_numpy() {
+    // With variances v = b²/12 of the picture and b²/64 of the reference; the threshold is scipy's norm.isf.
+    let variance = |share: f64| colours(&picture(|x, y, c| bands(x, y, c) * bands(x, y, c) / share));
+    let (image, reference) = (colours(&noisy_bands()), colours(&picture(bands)));
+    let z = z_test((&image, Some(&variance(12.0))), (&reference, Some(&variance(64.0)))).unwrap();
+    assert_eq!((z.values, z.beyond_2, z.beyond_3), (9216, 0.0, 0.0));
+    close("rms", z.rms, 0.916963772032476);
+    close("worst", z.worst, 1.5754992147798985);
+    close("whole", z.whole, -0.194668832604774);
+    assert!((z.threshold - 5.311777286964634).abs() < 1e-9, "{}", z.threshold);
+    let own = OwnError::new(&reference, &variance(12.0));
+    close("own relmse", own.relmse, 0.07178135109386805);
+    close("own mape", own.mape, 0.22273474636830082);
+    close("own mae", own.mae, 0.7795080551722646);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! What may be typed. These structs hold what was typed; `config` holds what it means.
 
+use super::measure_args::{BenchArgs, ConvergeArgs, MergeArgs, ProfileArgs};
 use crate::ray::Backend;
+use crate::render::ErrorTarget;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -10,7 +12,7 @@ use std::time::Duration;
 #[command(
     version,
     max_term_width = 110,
-    after_help = "Exit codes: 0 fine, 1 non-finite samples under --strict, 2 bad usage or input, 3 files cannot be read or written, 130 interrupted.\nThe same seed gives the same bits for any number of threads; --time may stop at another iteration each time."
+    after_help = "Exit codes: 0 fine, 1 non-finite samples under --strict or a regression found by bench, 2 bad usage or input, 3 files cannot be read or written, 130 interrupted.\nThe same seed gives the same bits for any number of threads; --time may stop at another iteration each time."
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -31,6 +33,14 @@ pub(crate) enum Command {
     Replay(Box<ReplayArgs>),
     /// Error metrics of an image against a reference
     Compare(CompareArgs),
+    /// Error against time, of several integrators side by side
+    Converge(Box<ConvergeArgs>),
+    /// Where the time of an integrator goes, and what bare ray queries would need
+    Profile(Box<ProfileArgs>),
+    /// Make one picture of renders with different seeds
+    Merge(MergeArgs),
+    /// Measure all scenes with all integrators, and compare with an earlier day
+    Bench(Box<BenchArgs>),
 }
 
 /// Where the scene comes from.
@@ -77,6 +87,10 @@ pub(crate) struct RenderArgs {
     /// Time budget of the iterations, e.g. 30s, 5m, 1.5h
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub time: Option<Duration>,
+    /// Stop when the estimated error is below, e.g. relmse=0.01 (also mape, mae, mse, rmse, relmse_trimmed); renders two halves with seeds of
+    /// their own, whose difference tells
+    #[arg(long, value_name = "MEASURE=VALUE", value_parser = ErrorTarget::parse, conflicts_with_all = ["checkpoint", "resume", "pyramid"])]
+    pub error_target: Option<ErrorTarget>,
     /// Seed
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
@@ -194,6 +208,15 @@ pub(crate) struct CompareArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Nothing but results and errors is printed anyway; for symmetry with other commands
+    #[arg(long, hide = true)]
+    pub quiet: bool,
+    /// Write a picture of the relative squared errors: .png, .exr or .pfm
+    #[arg(long, value_name = "FILE")]
+    pub error_image: Option<PathBuf>,
+    /// Let that picture show the sign: red where the image is too bright, blue where it is too dark
+    #[arg(long, requires = "error_image")]
+    pub signed: bool,
 }
 
 /// Ray-query backends by name.
@@ -215,7 +238,7 @@ impl Query {
     }
 }
 
-fn pair(text: &str) -> Result<(String, String), String> {
+pub(super) fn pair(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.is_empty() => Ok((name.into(), value.into())),
         _ => Err("expected name=value".into()),
@@ -232,7 +255,7 @@ fn triple(text: &str) -> Result<[f64; 3], String> {
     if v.iter().all(|c| c.is_finite()) { Ok(v) } else { Err("expected finite numbers".into()) }
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     numbers(text, 'x', "width and height, e.g. 640x360")
 }
 
@@ -244,7 +267,7 @@ fn crop(text: &str) -> Result<[u32; 4], String> {
     numbers(text, ',', "x,y,width,height")
 }
 
-fn duration(text: &str) -> Result<Duration, String> {
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let unit = match &text[digits.len()..] {
         "" | "s" => 1.0,

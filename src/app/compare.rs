@@ -2,18 +2,57 @@
 
 use super::Failure;
 use super::cli::CompareArgs;
-use crate::image::{Encoding, ImageFault, compare, read_image};
+use crate::image::error_image::{DECADES, ErrorView, error_image};
+use crate::image::metrics::{Colours, colours};
+use crate::image::z_test::{ZTest, z_test};
+use crate::image::{
+    Encoding, ExrFile, Image, ImageError, ImageFault, Layer, OutputFormat, Picture, Report, compare, read_image,
+    write_picture,
+};
+use serde::Serialize;
+use std::path::Path;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer {
+    #[serde(flatten)]
+    report: Report,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    z_test: Option<ZTest>,
+}
+
+/// A picture, and the variance of its pixels where a layer tells.
+fn read(path: &Path) -> Result<(Image, Option<Colours>), Failure> {
+    let fault = |e: ImageError| match e.fault {
+        ImageFault::Io(_) => Failure::io(&e),
+        _ => Failure::input(&e),
+    };
+    let image = read_image(path, Encoding::Auto).map_err(fault)?;
+    // A file that the simpler reader takes, but not the one for all layers, has no variance of ours.
+    let exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    let layers = exr.then(|| ExrFile::read(path).ok()).flatten();
+    Ok((image, layers.and_then(|f| f.colours("variance"))))
+}
 
 pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
-    let read = |path| {
-        read_image(path, Encoding::Auto).map_err(|e| match e.fault {
-            ImageFault::Io(_) => Failure::io(&e),
-            _ => Failure::input(&e),
-        })
-    };
-    let report = compare(&read(&args.image)?, &read(&args.reference)?).map_err(Failure::input)?;
+    if let Some(path) = &args.error_image {
+        OutputFormat::of(path).map_err(Failure::input)?;
+    }
+    let ((image, variance), (reference, reference_variance)) = (read(&args.image)?, read(&args.reference)?);
+    let report = compare(&image, &reference).map_err(Failure::input)?;
+    let (a, b, _) = colours(&image, &reference).map_err(Failure::input)?;
+    let z = z_test((&a, variance.as_deref()), (&b, reference_variance.as_deref()));
+    if let Some(path) = &args.error_image {
+        let view = if args.signed { ErrorView::Signed } else { ErrorView::Relative };
+        let pixels = error_image(&a, &b, view);
+        let channel = |c: usize| pixels.iter().map(|p| p[c]).collect::<Vec<f32>>();
+        let channels = vec![("R", channel(0)), ("G", channel(1)), ("B", channel(2))];
+        let layers = vec![Layer { name: String::new(), channels }];
+        let picture = Picture { width: image.width, height: image.height, layers, metadata: vec![] };
+        write_picture(path, &picture, 0.0).map_err(Failure::io)?;
+    }
     if args.json {
-        out!("{}", serde_json::to_string_pretty(&report).map_err(Failure::io)?);
+        out!("{}", serde_json::to_string_pretty(&Answer { report, z_test: z }).map_err(Failure::io)?);
         return Ok(());
     }
     // d: difference of a channel; r: the reference's channel; means over pixels and channels.
@@ -31,5 +70,18 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
         out!("{name:16}{value:<14.6e}{formula}");
     }
     out!("{:16}{:<14}pixels left out", "non-finite", report.non_finite);
+    if let Some(z) = z {
+        out!("Z-test          z = d / sqrt(variances), {} values with a variance", z.values);
+        out!("  rms z         {:<14.4}1 for equal expectations; less, as samples are stratified", z.rms);
+        out!("  |z| > 2       {:<14.4}0.0455 for a normal distribution", z.beyond_2);
+        out!("  |z| > 3       {:<14.4}0.0027 for a normal distribution", z.beyond_3);
+        out!("  worst |z|     {:<14.2}{:.2} is passed by chance once in a thousand comparisons", z.worst, z.threshold);
+        out!("  whole picture {:<14.2}z of the mean", z.whole);
+    }
+    if let (Some(path), false) = (&args.error_image, args.signed) {
+        out!("{}: d^2 / (r^2 + 0.01), 1e{} black to 1e{} white", path.display(), DECADES[0], DECADES[1]);
+    } else if let Some(path) = &args.error_image {
+        out!("{}: d / (r + 0.01), blue -1, white 0, red 1", path.display());
+    }
     Ok(())
 }

@@ -27,10 +27,11 @@ impl Config {
         let (spec, params) =
             Config::of_integrator(args.integrator.as_deref(), args.max_depth, &args.param, desc, diagnostics)?;
         let file_spp = desc.sensors.first().and_then(|s| s.sample_count).map(u64::from);
-        let iterations = match (args.spp, args.time) {
+        // A time or an error to reach replaces the scene's number of samples.
+        let iterations = match (args.spp, args.time.is_some() || args.error_target.is_some()) {
             (Some(spp), _) => Some(spp),
-            (None, Some(_)) => None,
-            (None, None) => Some(file_spp.unwrap_or(DEFAULT_SPP).max(1)),
+            (None, true) => None,
+            (None, false) => Some(file_spp.unwrap_or(DEFAULT_SPP).max(1)),
         };
         let threads = args
             .threads
@@ -95,6 +96,9 @@ impl Config {
         }
         if let Some(t) = self.budget.time {
             out!("time = {}s", t.as_secs_f64());
+        }
+        if let Some(target) = &args.error_target {
+            out!("error_target = {}={}", target.key, target.value);
         }
         out!("seed = {}", args.seed);
         out!("threads = {}", self.threads);

@@ -16,15 +16,21 @@ macro_rules! note {
     }};
 }
 
+mod bench;
 mod check_rays;
 mod cli;
 mod compare;
 mod config;
+mod converge;
 mod info;
+mod measure_args;
+mod merge;
+mod profile;
 mod pyramid;
 mod render;
 mod replay;
 mod report;
+mod stage;
 
 use clap::Parser;
 use std::process::ExitCode;
@@ -38,6 +44,8 @@ pub(crate) enum Failure {
     Io(String),
     /// `--strict`, and samples were not finite.
     NonFinite(u64),
+    /// `bench --against`: so many rows are worse than they were.
+    Regression(usize),
     /// Ctrl-C; everything was written.
     Interrupted,
 }
@@ -53,7 +61,7 @@ impl Failure {
 
     fn exit_code(&self) -> u8 {
         match self {
-            Failure::NonFinite(_) => 1,
+            Failure::NonFinite(_) | Failure::Regression(_) => 1,
             Failure::Input(_) => 2,
             Failure::Io(_) => 3,
             Failure::Interrupted => 130,
@@ -79,6 +87,10 @@ pub fn main() -> ExitCode {
         cli::Command::CheckRays(args) => check_rays::run(&args),
         cli::Command::Replay(args) => replay::run(&args),
         cli::Command::Compare(args) => compare::run(&args),
+        cli::Command::Converge(args) => converge::run(&args),
+        cli::Command::Profile(args) => profile::run(&args),
+        cli::Command::Merge(args) => merge::run(&args),
+        cli::Command::Bench(args) => bench::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -87,6 +99,7 @@ pub fn main() -> ExitCode {
                 Failure::Input(text) | Failure::Io(text) if text.is_empty() => {}
                 Failure::Input(text) | Failure::Io(text) => note!("error: {text}"),
                 Failure::NonFinite(n) => note!("error: {n} samples were not finite (--strict)"),
+                Failure::Regression(n) => note!("error: worse than the baseline beyond noise: {n} rows"),
                 Failure::Interrupted => note!("interrupted"),
             }
             ExitCode::from(failure.exit_code())

@@ -9,7 +9,10 @@ use crate::image::{OutputFormat, atomic_write, write_picture};
 use crate::integrators::Iteration;
 use crate::prepared::{PrepareOptions, PreparedScene};
 use crate::render::stats::Clock;
-use crate::render::{Checkpoint, CheckpointError, Progress, RenderStats, Stop, aov, output, render};
+use crate::render::stats::ErrorEstimate;
+use crate::render::{
+    Checkpoint, CheckpointError, Progress, RenderStats, Stop, aov, error_target, output, render, render_to_target,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -93,7 +96,21 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             format!("{} has no techniques to tell apart; --pyramid needs a bidirectional integrator", config.spec.name);
         return Err(Failure::Input(reason));
     }
+    let mut estimate = None;
     let outcome = pool.install(|| {
+        if let Some(target) = &args.error_target {
+            let build = || (config.spec.build)(&config.params);
+            let what = (args.seed, config.budget, target);
+            let (outcome, found) = render_to_target(&scene, build, &mut film, what, &interrupt, |progress, found| {
+                show(&bar, progress);
+                if let Some(found) = found {
+                    bar.set_message(format!("{} spp  {} about {found:.2e}", progress.iterations, target.key));
+                }
+            });
+            let seeds = error_target::seeds(args.seed);
+            estimate = Some(ErrorEstimate { measure: target.key, target: target.value, estimate: found, seeds });
+            return outcome;
+        }
         render(&scene, &mut *integrator, &mut film, args.seed, config.budget, &interrupt, |progress, film, state| {
             show(&bar, progress);
             if let (Some(path), Some(identity)) = (&args.checkpoint, &identity)
@@ -115,6 +132,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
 
     let run = (args.seed, config.threads, config.spec.name);
     let mut stats = RenderStats::new(&scene, &film, &outcome, phases, textures, run);
+    stats.error = estimate;
     let mut clock = Clock::default();
     let (mut written, mut result) = clock.time(|| pool.install(|| write_outputs(args, &config, &scene, &film, &stats)));
     if let (Some(folder), Some(pyramid)) = (&args.pyramid, integrator.pyramid()) {
@@ -173,7 +191,7 @@ fn check_writable(path: &Path) -> Result<(), Failure> {
 }
 
 /// The first Ctrl-C lets the iteration end and everything be written; the second quits at once.
-fn catch_ctrl_c(interrupt: Arc<AtomicBool>) -> Result<(), Failure> {
+pub(super) fn catch_ctrl_c(interrupt: Arc<AtomicBool>) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
         if interrupt.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
@@ -184,7 +202,7 @@ fn catch_ctrl_c(interrupt: Arc<AtomicBool>) -> Result<(), Failure> {
 
 const BAR_STEPS: u64 = 1000;
 
-fn progress_bar(quiet: bool) -> ProgressBar {
+pub(super) fn progress_bar(quiet: bool) -> ProgressBar {
     if quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
@@ -195,7 +213,7 @@ fn progress_bar(quiet: bool) -> ProgressBar {
     bar
 }
 
-fn show(bar: &ProgressBar, progress: &Progress) {
+pub(super) fn show(bar: &ProgressBar, progress: &Progress) {
     bar.set_position((progress.done * BAR_STEPS as f64) as u64);
     let rate = progress.rays as f64 / progress.elapsed.as_secs_f64().max(1e-9);
     bar.set_message(format!("{} spp  {:.2} Mrays/s", progress.iterations, rate / 1e6));
@@ -225,6 +243,9 @@ fn write_outputs(
 }
 
 fn metadata(args: &RenderArgs, config: &Config, stats: &RenderStats) -> Vec<(String, String)> {
+    // With an error target two renders were made one.
+    let seeds: Vec<String> =
+        stats.error.map_or_else(|| vec![stats.seed], |e| e.seeds.to_vec()).iter().map(u64::to_string).collect();
     let params: Vec<String> = config.params.pairs().into_iter().map(|(k, v)| format!("{k}={v}")).collect();
     [
         ("software", format!("lightsieve {}", stats.version)),
@@ -232,7 +253,7 @@ fn metadata(args: &RenderArgs, config: &Config, stats: &RenderStats) -> Vec<(Str
         ("integrator", config.spec.name.to_string()),
         ("parameters", params.join(" ")),
         ("iterations", stats.iterations.to_string()),
-        ("seed", stats.seed.to_string()),
+        ("seed", seeds.join(" ")),
         ("backend", stats.backend.clone()),
         ("nonFinite", stats.non_finite.to_string()),
         ("renderSeconds", format!("{:.3}", stats.wall_s)),
@@ -258,6 +279,10 @@ fn summarise(stats: &RenderStats, written: &[PathBuf]) {
         100.0 * stats.ray_query_share,
         stats.backend
     );
+    if let Some(e) = &stats.error {
+        let estimate = e.estimate.map_or("not known".into(), |v| format!("{v:.3e}"));
+        note!("{} by estimate {estimate} (target {:e})", e.measure, e.target);
+    }
     if stats.non_finite > 0 {
         note!("warning: {} samples were not finite and were left out; the first:", stats.non_finite);
         for p in &stats.non_finite_at {

@@ -94,6 +94,24 @@ impl Film {
         out
     }
 
+    /// Adds the sums of another film of the same part of the picture; the number of iterations is the caller's business.
+    ///
+    /// # Panics
+    /// If it is of another part.
+    pub fn add(&mut self, other: &Film) {
+        let window = |f: &Film| [f.x0, f.y0, f.width, f.height];
+        assert_eq!(window(self), window(other));
+        for (tile, more) in self.tiles.iter_mut().zip(&other.tiles) {
+            let into = |a: &mut [[f64; 3]], b: &[[f64; 3]]| {
+                a.as_flattened_mut().iter_mut().zip(b.as_flattened()).for_each(|(a, b)| *a += b);
+            };
+            into(&mut tile.sums, &more.sums);
+            into(&mut tile.squares, &more.squares);
+            tile.non_finite += more.non_finite;
+            tile.places.extend(&more.places);
+        }
+    }
+
     /// How many samples were not finite, and where the first of them were.
     pub fn non_finite(&self) -> (u64, Vec<NonFinite>) {
         let count = self.tiles.iter().map(|t| t.non_finite).sum();

@@ -40,7 +40,7 @@ pub struct SizeMismatch {
 }
 
 /// The part of a [`Report`] that looks at each pixel alone; cheap enough for every iteration of a render.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PixelErrors {
     /// See [`Report::mse`].
     pub mse: f64,
@@ -96,9 +96,14 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Report, SizeMismatch>
     })
 }
 
-type Colours = Vec<[f64; 3]>;
+/// Pixels in linear colour.
+pub type Colours = Vec<[f64; 3]>;
 
-fn colours(image: &Image, reference: &Image) -> Result<(Colours, Colours, usize), SizeMismatch> {
+/// Linear colours of both pictures, row by row, and their width.
+///
+/// # Errors
+/// [`SizeMismatch`].
+pub fn colours(image: &Image, reference: &Image) -> Result<(Colours, Colours, usize), SizeMismatch> {
     let size = |i: &Image| (i.width, i.height);
     if size(image) != size(reference) {
         return Err(SizeMismatch { image: size(image), reference: size(reference) });

@@ -98,7 +98,7 @@ pub fn read_image(path: &Path, encoding: Encoding) -> Result<Image, ImageError> 
         .map_err(|fault| ImageError { path: path.to_owned(), fault })
 }
 
-fn read_file(path: &Path) -> Result<Vec<u8>, ImageFault> {
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ImageFault> {
     let file = std::fs::File::open(path)?;
     let metadata = file.metadata()?;
     if !metadata.is_file() {

@@ -15,9 +15,11 @@ pub mod embree;
 pub mod geometry;
 pub mod obvhs;
 pub mod offset;
+pub mod phases;
 pub mod tracer;
 
 pub use geometry::{Geometry, Instance, MeshBuffers, VertexBuffer};
+pub use phases::Phases;
 pub use tracer::{RayKind, RayStats, Tracer};
 
 use crate::math::Vec3;

@@ -5,7 +5,7 @@
 
 #[cfg(any(embree3, embree4))]
 use super::embree::EmbreeScene;
-use super::{Hit, PACKET, Ray, RayQuery, SegmentPacket};
+use super::{Hit, PACKET, Phases, Ray, RayQuery, SegmentPacket};
 use std::sync::LazyLock;
 use std::time::Instant;
 
@@ -46,6 +46,12 @@ impl RayKind {
         RayKind::Cache,
         RayKind::ShadowPmf,
     ];
+
+    /// It asks only whether something is in the way.
+    pub fn is_shadow(self) -> bool {
+        use RayKind::{ShadowConnection, ShadowDirect, ShadowLens, ShadowPmf};
+        matches!(self, ShadowDirect | ShadowLens | ShadowConnection | ShadowPmf)
+    }
 
     /// Name in statistics.
     pub fn name(self) -> &'static str {
@@ -115,6 +121,8 @@ pub struct RayStats {
     pub kinds: [KindStats; KINDS],
     /// Rays with a component that is not finite; they were not traced.
     pub invalid: u64,
+    /// Wall seconds by phase.
+    pub phases: Phases,
 }
 
 impl RayStats {
@@ -128,6 +136,7 @@ impl RayStats {
             a.timed_ns += b.timed_ns;
         }
         self.invalid += o.invalid;
+        self.phases.merge(&o.phases);
     }
 
     /// All rays.

@@ -18,11 +18,22 @@ pub struct Budget {
     pub time: Option<Duration>,
 }
 
+impl Budget {
+    /// True if nothing is left with `iterations` in the film, `done` of them in the time `elapsed` of this run: an iteration that
+    /// would overshoot is not started, but the first is.
+    pub(super) fn used_up(&self, iterations: u64, done: u64, elapsed: Duration) -> bool {
+        let late = |time| done > 0 && elapsed + elapsed / u32::try_from(done).unwrap_or(u32::MAX) > time;
+        self.iterations.is_some_and(|n| iterations >= n) || self.time.is_some_and(late)
+    }
+}
+
 /// Why the loop ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The budget is used up.
     Budget,
+    /// The error is below its target.
+    Converged,
     /// Somebody asked.
     Interrupted,
 }
@@ -70,14 +81,7 @@ pub fn render(
     let mut rays = RayStats::default();
     let (cpu_before, first) = (cpu_seconds(), film.iterations);
     let stop = loop {
-        if budget.iterations.is_some_and(|n| film.iterations >= n) {
-            break Stop::Budget;
-        }
-        let done = film.iterations - first;
-        if let Some(time) = budget.time
-            && done > 0
-            && clock.total() + clock.total() / u32::try_from(done).unwrap_or(u32::MAX) > time
-        {
+        if budget.used_up(film.iterations, film.iterations - first, clock.total()) {
             break Stop::Budget;
         }
         if interrupt.load(Ordering::Relaxed) {
@@ -97,7 +101,7 @@ pub fn render(
     Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations: film.iterations - first }
 }
 
-fn share(budget: &Budget, film: &Film, elapsed: Duration) -> f64 {
+pub(super) fn share(budget: &Budget, film: &Film, elapsed: Duration) -> f64 {
     let by_iterations = budget.iterations.map_or(0.0, |n| film.iterations as f64 / n.max(1) as f64);
     let by_time = budget.time.map_or(0.0, |t| elapsed.as_secs_f64() / t.as_secs_f64().max(1e-9));
     by_iterations.max(by_time).min(1.0)

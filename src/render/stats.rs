@@ -47,6 +47,19 @@ pub fn peak_rss_bytes() -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| kb * 1024)
 }
 
+/// An error that is estimated from the picture alone, see [`super::error_target`].
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ErrorEstimate {
+    /// Measure.
+    pub measure: &'static str,
+    /// What was asked for.
+    pub target: f64,
+    /// What it is by estimate; none if there were too few iterations.
+    pub estimate: Option<f64>,
+    /// The two seeds that the estimate compares.
+    pub seeds: [u64; 2],
+}
+
 /// The scene in numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneStats {
@@ -89,6 +102,9 @@ pub struct RenderStats {
     pub non_finite_at: Vec<NonFinite>,
     /// Rays with a component that was not finite; not traced.
     pub invalid_rays: u64,
+    /// The error that the render was to get below, and what it is by estimate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<ErrorEstimate>,
     /// Seed.
     pub seed: u64,
     /// Threads.
@@ -116,6 +132,9 @@ impl RenderStats {
         let (seed, threads, integrator) = run;
         let wall = outcome.wall.as_secs_f64();
         phases.insert("render", wall);
+        for (name, seconds) in outcome.rays.phases.iter() {
+            phases.insert(name, seconds);
+        }
         let (non_finite, non_finite_at) = film.non_finite();
         let kinds = || RayKind::ALL.iter().map(|&k| (k.name(), &outcome.rays.kinds[k as usize]));
         let rays = outcome.rays.total();
@@ -136,6 +155,7 @@ impl RenderStats {
             non_finite,
             non_finite_at,
             invalid_rays: outcome.rays.invalid,
+            error: None,
             seed,
             threads,
             backend: scene.query.describe(),

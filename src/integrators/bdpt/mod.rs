@@ -22,7 +22,7 @@ use crate::math::sampler::PathSampler;
 use crate::mis::{Heuristic, Side, Techniques, Weigher};
 use crate::path::{Limits, ShadowQueue, WalkStart, walk};
 use crate::prepared::{Features, PreparedScene};
-use crate::ray::{Ray, RayKind, RayStats, Tracer};
+use crate::ray::{Phases, Ray, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use eye_path::{Arrival, EyeHooks, EyeQueues};
 use light_path::{LensQueue, LightPath};
@@ -358,7 +358,8 @@ impl Integrator for Bidirectional {
             .zip(&mut samples)
             .with_max_len(1)
             .map_init(Worker::new, |worker, (tile, samples)| this.render_tile(iteration, tile, samples, worker));
-        harvest.add(tiles.collect());
+        let mut phases = Phases::default();
+        harvest.add(phases.time("sub-paths and connections", || tiles.collect()));
 
         let light_image = this.weigher.techniques.uses_light_image().then(|| {
             if scene.features.contains(Features::CROP) {
@@ -368,13 +369,16 @@ impl Integrator for Bidirectional {
                         let first = chunk * LIGHT_PATHS_AT_ONCE;
                         this.light_only(iteration, first..all.min(first + LIGHT_PATHS_AT_ONCE), worker)
                     });
-                harvest.add(outside.collect());
+                harvest.add(phases.time("light paths outside of the crop", || outside.collect()));
             }
-            LightImage::new(scene.window, std::mem::take(&mut harvest.splats))
+            phases.time("light image", || LightImage::new(scene.window, std::mem::take(&mut harvest.splats)))
         });
-        film.tiles.par_iter_mut().zip(&samples).for_each(|(tile, samples)| {
-            tile.commit(samples, light_image.as_ref(), iteration.index);
+        phases.time("film", || {
+            film.tiles.par_iter_mut().zip(&samples).for_each(|(tile, samples)| {
+                tile.commit(samples, light_image.as_ref(), iteration.index);
+            });
         });
+        harvest.stats.phases.merge(&phases);
         film.iterations += 1;
         self.samples = samples;
         self.learn();

@@ -15,7 +15,7 @@ use crate::math::{Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Heuristic;
 use crate::path::{Edge, Limits, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, direct_segment, walk};
 use crate::prepared::PreparedScene;
-use crate::ray::{Ray, RayKind, RayStats, Tracer};
+use crate::ray::{Phases, Ray, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use rayon::prelude::*;
 
@@ -132,18 +132,17 @@ impl Carried {
 impl Integrator for PathTracer {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
         let this = &*self;
-        let stats = film
-            .tiles
-            .par_iter_mut()
-            // A tile is much more work than handing it over, and larger pieces leave threads idle at the end of an iteration.
-            .with_max_len(1)
-            .map_init(SampleBuffer::default, |samples, tile| this.render_tile(iteration, tile, samples))
-            .reduce(RayStats::default, |mut a, b| {
-                a.merge(&b);
-                a
-            });
+        let mut phases = Phases::default();
+        // A tile is much more work than handing it over, and larger pieces leave threads idle at the end of an iteration.
+        let tiles = film.tiles.par_iter_mut().with_max_len(1);
+        let tiles = tiles.map_init(SampleBuffer::default, |samples, tile| this.render_tile(iteration, tile, samples));
+        let sum = |mut a: RayStats, b: RayStats| {
+            a.merge(&b);
+            a
+        };
+        let stats = phases.time("eye paths and film", || tiles.reduce(RayStats::default, sum));
         film.iterations += 1;
-        stats
+        RayStats { phases, ..stats }
     }
 
     fn replay(&mut self, iteration: &Iteration, pixel: (u32, u32)) -> Replay {

@@ -22,7 +22,7 @@ use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH, TECHNIQUES}
 use super::{IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params};
 use crate::math::Vec3;
 use crate::mis::{Heuristic, Resampled, Weigher};
-use crate::ray::RayStats;
+use crate::ray::{Phases, RayStats};
 use crate::shade::SurfacePoint;
 use caches::{Caches, Pmfs};
 use store::LightStore;
@@ -279,24 +279,26 @@ impl Bidirectional {
 
     /// Gets the candidates of an iteration ready.
     pub(in crate::integrators) fn prepare_resampling(&mut self, iteration: &Iteration) -> RayStats {
-        let mut stats = RayStats::default();
+        let (mut stats, mut phases) = (RayStats::default(), Phases::default());
         if self.resampler.as_ref().is_none_or(|_| !self.weigher.techniques.uses_connections()) {
             return stats;
         }
         if self.resampler.as_ref().is_some_and(|r| r.caches.is_none()) {
-            self.prepare_caches(iteration, &mut stats);
+            phases.time("placing caches", || self.prepare_caches(iteration, &mut stats));
         }
         let Some(resampler) = &self.resampler else { return stats };
         self.weigher.resampled = resampler.resampled();
-        let (store, s) = LightStore::trace(self, iteration, resampler.settings.paths, 0);
+        let paths = resampler.settings.paths;
+        let (store, s) = phases.time("light paths", || LightStore::trace(self, iteration, paths, 0));
         stats.merge(&s);
         let Some(resampler) = &mut self.resampler else { return stats };
         if let Some(caches) = &resampler.caches {
-            let (pmfs, irradiances, s) = caches.pmfs(iteration.scene, &store);
+            let (pmfs, irradiances, s) = phases.time("pmfs", || caches.pmfs(iteration.scene, &store));
             stats.merge(&s);
             (resampler.pmfs, resampler.pending) = (pmfs, irradiances);
         }
         resampler.store = store;
+        stats.phases.merge(&phases);
         stats
     }
 

@@ -1,0 +1,135 @@
+//! `lightsieve bench`: all scenes with all integrators, against an earlier day.
+
+use super::Failure;
+use super::measure_args::BenchArgs;
+use super::stage::{Set, Stage, to_json};
+use crate::image::atomic_write;
+use crate::measure::bench::{Baseline, Row, Table as Measured, Verdict, against, calibrate};
+use crate::measure::converge::converge;
+use crate::measure::curve::runs_of;
+use crate::measure::report::Table;
+use crate::measure::{LoadWatch, Machine};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer<'a> {
+    #[serde(flatten)]
+    measured: &'a Measured,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    against: Option<&'a [Verdict]>,
+}
+
+pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
+    let baseline = args.against.as_deref().map(read).transpose()?;
+    let stage = Stage::new(&args.measure)?;
+    let scenes = find_scenes(&args.folder)?;
+    let (watch, mut rows, mut backend) = (LoadWatch::start(), vec![], String::new());
+    for path in &scenes {
+        let set = stage.set(path, Some(&args.references))?;
+        stage.say(&format!("{}: {} methods", set.name, set.contenders.len()));
+        rows.extend(one_scene(args, &stage, &set)?);
+        backend = set.scene.query.describe();
+        if stage.interrupt.load(Ordering::Relaxed) {
+            return Err(Failure::Interrupted);
+        }
+    }
+    let measured = Measured { machine: Machine::here(stage.threads, backend), load: watch.finish(), rows };
+    let verdicts = baseline.as_ref().map(|old| against(&old.rows, &measured.rows));
+    if args.measure.json {
+        out!("{}", to_json(&Answer { measured: &measured, against: verdicts.as_deref() })?);
+    } else {
+        print(&measured.rows, verdicts.as_deref());
+    }
+    stage.say(&measured.load.sentence());
+    if let Some(path) = &args.save {
+        let text = to_json(&measured)?;
+        atomic_write(path, |w| writeln!(w, "{text}")).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+    }
+    let worse =
+        verdicts.iter().flatten().filter(|v| v.time.regression || v.error.is_some_and(|e| e.regression)).count();
+    match (verdicts, worse) {
+        (Some(v), _) if v.is_empty() => {
+            Err(Failure::Input("the baseline has none of these scenes and methods: nothing was compared".into()))
+        }
+        (_, 0) => Ok(()),
+        (_, n) => Err(Failure::Regression(n)),
+    }
+}
+
+fn read(path: &Path) -> Result<Baseline, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+    serde_json::from_str(&text)
+        .map_err(|e| Failure::Input(format!("{}: not what `bench --save` writes: {e}", path.display())))
+}
+
+/// The folder's .xml files and those of the folders in it, in the order of their names.
+fn find_scenes(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let list = |folder: &Path| -> Result<Vec<PathBuf>, Failure> {
+        let io = |e: std::io::Error| Failure::Io(format!("{}: {e}", folder.display()));
+        let entries = std::fs::read_dir(folder).map_err(io)?;
+        let mut paths = entries.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>().map_err(io)?;
+        paths.sort();
+        Ok(paths)
+    };
+    let is_scene = |path: &PathBuf| path.is_file() && path.extension().is_some_and(|e| e == "xml");
+    let mut scenes = vec![];
+    for path in list(folder)? {
+        if path.is_dir() {
+            scenes.extend(list(&path)?.into_iter().filter(is_scene));
+        } else if is_scene(&path) {
+            scenes.push(path);
+        }
+    }
+    if scenes.is_empty() {
+        return Err(Failure::Input(format!("{}: there are no scenes (.xml) in this folder", folder.display())));
+    }
+    Ok(scenes)
+}
+
+fn one_scene(args: &BenchArgs, stage: &Stage, set: &Set) -> Result<Vec<Row>, Failure> {
+    let reference = stage.reference(set, &args.references)?;
+    let seeds: Vec<u64> = (1..=args.seeds).collect();
+    let (before, runs, after) = stage.pool.install(|| {
+        let before = calibrate();
+        let time = (args.time, seeds.as_slice());
+        let runs = converge(&set.scene, &set.contenders, &reference.pixels, time, &stage.interrupt, |_| {});
+        (before, runs, calibrate())
+    });
+    let mood = 0.5 * (before + after);
+    let row = |c: &crate::measure::Contender| Row::new(&set.name, &c.label, &runs_of(&runs, &c.label), mood);
+    Ok(set.contenders.iter().map(row).collect())
+}
+
+fn print(rows: &[Row], verdicts: Option<&[Verdict]>) {
+    let mut head = vec!["scene", "method", "ms per sample", "samples", "relMSE", "relMSE x seconds"];
+    if verdicts.is_some() {
+        head.extend(["time", "error", ""]);
+    }
+    let mut table = Table::new(head);
+    for row in rows {
+        let (samples, error) = row.last_error().unwrap_or((0, f64::NAN));
+        let mut cells = vec![
+            row.scene.clone(),
+            row.method.clone(),
+            format!("{:.3}", 1e3 * row.seconds()),
+            samples.to_string(),
+            format!("{error:.3e}"),
+            format!("{:.3e}", error * samples as f64 * row.seconds()),
+        ];
+        let verdict = verdicts.into_iter().flatten().find(|v| v.scene == row.scene && v.method == row.method);
+        if let Some(v) = verdict {
+            cells.push(format!("x {:.3}", v.time.ratio));
+            cells.push(v.error.map_or("–".into(), |e| format!("x {:.3}", e.ratio)));
+            let slower = v.time.regression.then(|| format!("slower (bound {:.3})", v.time.bound));
+            let worse = v.error.filter(|e| e.regression).map(|e| format!("worse (bound {:.3})", e.bound));
+            cells.push(slower.into_iter().chain(worse).collect::<Vec<_>>().join(", "));
+        }
+        table.row(cells);
+    }
+    for line in table.lines() {
+        out!("{line}");
+    }
+}

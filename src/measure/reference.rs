@@ -1,0 +1,196 @@
+//! References: what errors are measured against. One that was rendered is kept under the hash of its scene and settings.
+
+use super::Contender;
+use crate::film::Film;
+use crate::image::{Encoding, ExrFile, read_image, write_picture};
+use crate::math::hash::mix64;
+use crate::prepared::PreparedScene;
+use crate::render::{Budget, Progress, Stop, output, render, scene_hash};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Seed of references: far from those that people type, so that a reference shares no sample with what it judges.
+pub const REFERENCE_SEED: u64 = 0x5eed_7e57;
+
+/// A picture to compare with.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Width and height.
+    pub size: [u32; 2],
+    /// Linear colours, row by row.
+    pub pixels: Vec<[f64; 3]>,
+    /// What is known of it.
+    pub facts: ReferenceFacts,
+}
+
+/// What a reader of a table must know of its reference.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReferenceFacts {
+    /// File.
+    pub file: PathBuf,
+    /// How it was made, as far as its header tells.
+    pub integrator: Option<String>,
+    /// Samples per pixel.
+    pub iterations: Option<String>,
+    /// Seeds.
+    pub seeds: Option<String>,
+    /// Its own error, from its variance layer. Samples are stratified over iterations, so that this is an upper estimate.
+    pub own: Option<OwnError>,
+    /// Pixels that are not finite; errors leave them out.
+    pub non_finite: u64,
+}
+
+/// Estimated error of a picture against what it converges to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct OwnError {
+    /// Mean of v / (r² + 0.01), v the variance of the mean.
+    pub relmse: f64,
+    /// Mean of √(2v/π) / (r + 0.01), which is the expectation of |d| / (r + 0.01) of a normal error.
+    pub mape: f64,
+    /// Mean of √(2v/π).
+    pub mae: f64,
+}
+
+/// A reference cannot be had.
+#[derive(Debug, thiserror::Error)]
+pub enum ReferenceError {
+    /// The file cannot be read or is no picture.
+    #[error("{0}")]
+    Image(#[from] crate::image::ImageError),
+    /// It cannot be written.
+    #[error("{0}")]
+    Write(#[from] crate::image::WriteError),
+    /// The cache's folder cannot be made.
+    #[error("{}: {source}", path.display())]
+    Folder {
+        /// Folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Ctrl-C.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl OwnError {
+    /// From means and the variances of these means.
+    pub fn new(pixels: &[[f64; 3]], variance: &[[f64; 3]]) -> OwnError {
+        let (mut sums, mut n) = ([0.0; 3], 0u64);
+        for (r, v) in pixels.iter().flatten().zip(variance.iter().flatten()) {
+            if r.is_finite() && v.is_finite() {
+                let absolute = (v * std::f64::consts::FRAC_2_PI).sqrt();
+                sums[0] += v / (r * r + 0.01);
+                sums[1] += absolute / (r + 0.01);
+                sums[2] += absolute;
+                n += 1;
+            }
+        }
+        let [relmse, mape, mae] = sums.map(|s| s / n as f64);
+        OwnError { relmse, mape, mae }
+    }
+}
+
+impl Reference {
+    /// Reads any picture; an EXR file of this program also tells how it was made and how exact it is.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn read(path: &Path) -> Result<Reference, ReferenceError> {
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+            let file = ExrFile::read(path)?;
+            if let Some(pixels) = file.colours("") {
+                let own = file.colours("variance").map(|v| OwnError::new(&pixels, &v));
+                let text = |name: &str| file.text(&format!("lightsieve:{name}")).map(str::to_owned);
+                let integrator = text("integrator").map(|i| format!("{i} {}", text("parameters").unwrap_or_default()));
+                let facts = ReferenceFacts {
+                    file: path.to_owned(),
+                    integrator,
+                    iterations: text("iterations"),
+                    seeds: text("seed"),
+                    own,
+                    non_finite: non_finite(&pixels),
+                };
+                return Ok(Reference { size: [file.width, file.height], pixels, facts });
+            }
+        }
+        let image = read_image(path, Encoding::Auto)?;
+        let all = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
+        let pixels: Vec<[f64; 3]> = all.map(|(x, y)| image.rgb(x, y).to_array().map(f64::from)).collect();
+        let facts = ReferenceFacts {
+            file: path.to_owned(),
+            integrator: None,
+            iterations: None,
+            seeds: None,
+            own: None,
+            non_finite: non_finite(&pixels),
+        };
+        Ok(Reference { size: [image.width, image.height], pixels, facts })
+    }
+
+    /// The reference of a scene from the cache, or rendered and put there. Runs on the current thread pool.
+    ///
+    /// # Errors
+    /// If the cache cannot be used, or the render was interrupted.
+    pub fn cached(
+        scene: &PreparedScene,
+        (name, method, budget): (&str, &Contender, Budget),
+        folder: &Path,
+        interrupt: &AtomicBool,
+        mut watch: impl FnMut(&Progress),
+    ) -> Result<Reference, ReferenceError> {
+        let settings = format!(
+            "{} {} {:?} {:?} {:?} {}",
+            method.spec.name,
+            method.parameters(),
+            scene.film_size,
+            scene.window,
+            budget,
+            env!("CARGO_PKG_VERSION"),
+        );
+        let hash = settings.bytes().fold(scene_hash(scene), |h, b| mix64(h.rotate_left(5) ^ u64::from(b)));
+        let path = folder.join(format!("{name}-{}-{hash:016x}.exr", method.spec.name));
+        if path.is_file() {
+            return Reference::read(&path);
+        }
+        std::fs::create_dir_all(folder).map_err(|source| ReferenceError::Folder { path: folder.to_owned(), source })?;
+        let mut film = Film::new(scene.window);
+        let mut integrator = (method.spec.build)(&method.params);
+        let outcome = render(scene, &mut *integrator, &mut film, REFERENCE_SEED, budget, interrupt, |p, _, _| watch(p));
+        if outcome.stop == Stop::Interrupted {
+            return Err(ReferenceError::Interrupted);
+        }
+        let metadata = [
+            ("scene", name.to_owned()),
+            ("integrator", method.spec.name.to_owned()),
+            ("parameters", method.parameters()),
+            ("iterations", film.iterations.to_string()),
+            ("seed", REFERENCE_SEED.to_string()),
+            ("renderSeconds", format!("{:.3}", outcome.wall.as_secs_f64())),
+        ];
+        let metadata = metadata.into_iter().map(|(k, v)| (format!("lightsieve:{k}"), v)).collect();
+        write_picture(&path, &output::picture(&film, vec![], metadata), 0.0)?;
+        Reference::read(&path)
+    }
+}
+
+impl ReferenceFacts {
+    /// As a sentence.
+    pub fn sentence(&self) -> String {
+        let unknown = || "an unknown number of".to_owned();
+        let made = match &self.integrator {
+            Some(i) => format!("{} samples per pixel of {i}", self.iterations.clone().unwrap_or_else(unknown)),
+            None => "made by another program".to_owned(),
+        };
+        let own = match self.own {
+            Some(e) => format!("its own error is at most about relMSE {:.2e}, MAPE {:.2e}", e.relmse, e.mape),
+            None => "its own error is not known (no variance layer)".to_owned(),
+        };
+        format!("reference {}: {made}; {own}", self.file.display())
+    }
+}
+
+fn non_finite(pixels: &[[f64; 3]]) -> u64 {
+    pixels.iter().filter(|p| !p.iter().all(|v| v.is_finite())).count() as u64
+}

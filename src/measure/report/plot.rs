@@ -1,0 +1,198 @@
+//! A log-log plot as SVG.
+
+use super::html::escape;
+use std::fmt::Write;
+
+/// A curve with what it varies in.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// Name in the legend.
+    pub name: String,
+    /// x, y, smallest and largest y.
+    pub points: Vec<[f64; 4]>,
+}
+
+/// A plot.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// What it shows.
+    pub title: String,
+    /// Name of the axes.
+    pub axes: [String; 2],
+    /// Curves.
+    pub lines: Vec<Line>,
+    /// A level below which nothing can be told, with its name.
+    pub floor: Option<(String, f64)>,
+}
+
+/// Okabe & Ito's colours, which most colour-blind people can tell apart.
+const COLOURS: [&str; 8] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c6d31"];
+
+const SIZE: [f64; 2] = [560.0, 380.0];
+/// Left, top, right, bottom.
+const MARGIN: [f64; 4] = [64.0, 30.0, 14.0, 44.0];
+const LEGEND_LINE: f64 = 16.0;
+
+/// A logarithmic axis between two values on the way from one coordinate to another.
+struct Axis {
+    lo: f64,
+    hi: f64,
+    from: f64,
+    to: f64,
+}
+
+impl Axis {
+    fn new(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Option<Axis> {
+        let logs = values.filter(|v| v.is_finite() && *v > 0.0).map(f64::log10);
+        let (lo, hi) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
+        // A little air, and never an axis without length.
+        let air = (0.04 * (hi - lo)).max(0.05);
+        (lo <= hi).then_some(Axis { lo: lo - air, hi: hi + air, from, to })
+    }
+
+    fn at(&self, value: f64) -> f64 {
+        let v = value.max(1e-300).log10().clamp(self.lo, self.hi);
+        self.from + (v - self.lo) / (self.hi - self.lo) * (self.to - self.from)
+    }
+
+    /// Values to label: powers of ten, with twos and fives where there is room.
+    fn ticks(&self) -> Vec<(f64, bool)> {
+        let fine = self.hi - self.lo < 2.5;
+        let mut ticks = vec![];
+        for decade in self.lo.floor() as i32..=self.hi.ceil() as i32 {
+            for digit in 1..10 {
+                let value = f64::from(digit) * 10f64.powi(decade);
+                if (self.lo..=self.hi).contains(&value.log10()) {
+                    ticks.push((value, digit == 1 || fine && (digit == 2 || digit == 5)));
+                }
+            }
+        }
+        ticks
+    }
+}
+
+fn label(value: f64) -> String {
+    if (1e-3..1e4).contains(&value) {
+        let digits = (-value.log10().floor()).max(0.0) as usize;
+        format!("{value:.digits$}")
+    } else {
+        format!("{value:.0e}")
+    }
+}
+
+impl Plot {
+    /// The picture; a sentence where there is nothing to show.
+    pub fn svg(&self) -> String {
+        let all = || self.lines.iter().flat_map(|l| &l.points);
+        let [width, bottom] = SIZE;
+        let (left, right) = (MARGIN[0], width - MARGIN[2]);
+        let (top, base) = (MARGIN[1], bottom - MARGIN[3]);
+        let heights = all().flat_map(|p| p[1..].iter().copied());
+        let (Some(x), Some(y)) = (Axis::new(all().map(|p| p[0]), left, right), Axis::new(heights, base, top)) else {
+            return format!("<p>{}: nothing to plot</p>", escape(&self.title));
+        };
+        let height = bottom + LEGEND_LINE * (self.lines.len() + 1) as f64;
+        let mut out = format!(
+            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\
+             <text class=\"title\" x=\"{left}\" y=\"18\">{0}</text>",
+            escape(&self.title)
+        );
+        for (value, named) in x.ticks() {
+            let at = x.at(value);
+            let _ = write!(out, "<path class=\"grid\" d=\"M{at:.1} {top}V{base}\"/>");
+            if named {
+                let _ = write!(
+                    out,
+                    "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+                    base + 15.0,
+                    label(value)
+                );
+            }
+        }
+        for (value, named) in y.ticks() {
+            let at = y.at(value);
+            let _ = write!(out, "<path class=\"grid\" d=\"M{left} {at:.1}H{right}\"/>");
+            if named {
+                let _ = write!(
+                    out,
+                    "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                    left - 5.0,
+                    at + 4.0,
+                    label(value)
+                );
+            }
+        }
+        let _ = write!(
+            out,
+            "<path class=\"frame\" d=\"M{left} {top}H{right}V{base}H{left}Z\"/>\
+             <text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\
+             <text transform=\"translate(14 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            0.5 * (left + right),
+            base + 32.0,
+            escape(&self.axes[0]),
+            0.5 * (top + base),
+            escape(&self.axes[1]),
+        );
+        for (i, line) in self.lines.iter().enumerate() {
+            curve(&mut out, line, COLOURS[i % COLOURS.len()], &x, &y);
+            let at = bottom + LEGEND_LINE * i as f64;
+            let _ = write!(
+                out,
+                "<path d=\"M{left} {:.1}h22\" stroke=\"{}\" stroke-width=\"2.5\"/><text x=\"{}\" y=\"{:.1}\">{}</text>",
+                at - 4.0,
+                COLOURS[i % COLOURS.len()],
+                left + 28.0,
+                at,
+                escape(&line.name)
+            );
+        }
+        if let Some((name, level)) = &self.floor {
+            let at = bottom + LEGEND_LINE * self.lines.len() as f64;
+            let _ = write!(
+                out,
+                "<path class=\"floor\" d=\"M{left} {0:.1}h22\"/><text x=\"{1}\" y=\"{2:.1}\">{3}: {level:.2e}</text>",
+                at - 4.0,
+                left + 28.0,
+                at,
+                escape(name)
+            );
+            if level.log10() >= y.lo {
+                let _ = write!(out, "<path class=\"floor\" d=\"M{left} {0:.1}H{right}\"/>", y.at(*level));
+            }
+        }
+        out.push_str("</svg>");
+        out
+    }
+}
+
+fn curve(out: &mut String, line: &Line, colour: &str, x: &Axis, y: &Axis) {
+    let place = |p: &[f64; 4], v: usize| format!("{:.1} {:.1}", x.at(p[0]), y.at(p[v]));
+    let points: Vec<&[f64; 4]> = line.points.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+    if points.is_empty() {
+        return;
+    }
+    let upper: Vec<String> = points.iter().map(|p| place(p, 3)).collect();
+    let lower: Vec<String> = points.iter().rev().map(|p| place(p, 2)).collect();
+    let middle: Vec<String> = points.iter().map(|p| place(p, 1)).collect();
+    let _ = write!(
+        out,
+        "<path d=\"M{}L{}Z\" fill=\"{colour}\" fill-opacity=\"0.15\"/>\
+         <path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>",
+        upper.join("L"),
+        lower.join("L"),
+        middle.join("L")
+    );
+    for p in points {
+        let _ = write!(
+            out,
+            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.8\" fill=\"{colour}\"><title>{}: {:.3} s, {:.4e} ({:.3e} to {:.3e})</title></circle>",
+            x.at(p[0]),
+            y.at(p[1]),
+            escape(&line.name),
+            p[0],
+            p[1],
+            p[2],
+            p[3]
+        );
+    }
+}
