@@ -92,16 +92,16 @@ pub fn densities(
     });
     let mut factors = vec![1.0; k + 1];
     if let Some(resampled) = &weigher.resampled {
-        // β_L as a light's walk has it on arriving at v_i.
+        // β_L as a light's walk has it on arriving at v_{i−1}.
         let mut arriving = path.origin.flux.to_array().map(f64::from);
-        for i in 2..k {
+        for (i, factor) in factors.iter_mut().enumerate().take(k).skip(2) {
             let v = &path.interior[i - 2];
             let (from, to) = (-path.edge(i - 2).0, path.edge(i - 1).0);
             let value = v.delta.map_or_else(|| v.bsdf.eval(from, to, Transport::Importance), |(_, value)| value);
             let scattered: [f64; 3] = std::array::from_fn(|c| arriving[c] * f64::from(value[c]));
             let brings = Rgb::from(scattered.map(|v| (v * to_area(i, i - 1)) as f32)).luminance();
             arriving = scattered.map(|v| v / scatter(i - 1, from, to, true));
-            factors[i] = f64::from(resampled.factor(brings, irradiance(&path.interior[i - 1].point, -to)));
+            *factor = f64::from(resampled.factor(brings, irradiance(&path.interior[i - 1].point, -to)));
         }
     }
     Densities { light: from_light, eye: from_eye, joinable, next_event, factors }

@@ -46,7 +46,7 @@ fn facing(n: Vec3) -> usize {
 }
 
 fn direction(facing: usize) -> Vec3 {
-    let sign = if facing % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if facing.is_multiple_of(2) { 1.0 } else { -1.0 };
     [Vec3::X, Vec3::Y, Vec3::Z][facing / 2] * sign
 }
 

@@ -69,7 +69,8 @@ impl LightVertex {
         let dist2 = to.length_squared();
         let towards = to * (1.0 / dist2.sqrt());
         let cos = -n.dot(towards);
-        if !(cos > 0.0) {
+        // A point on the light vertex itself has no direction to it: not a number, and not above its horizon.
+        if cos.is_nan() || cos <= 0.0 {
             return 0.0;
         }
         let value = self.bsdf.eval(self.wo, towards, Transport::Importance);
