@@ -74,7 +74,7 @@ fn count(replay: &Replay) -> PixelCost {
     cost
 }
 
-/// Runs samples of every pixel, or of as many pixels as leave time for [`PASSES`] samples of each, for about `time`. On the current thread
+/// Runs samples of every pixel, or of as many pixels as leave time for several samples of each, for about `time`. On the current thread
 /// pool.
 pub fn cost_map(scene: &PreparedScene, method: &Contender, seed: u64, time: Duration) -> CostMap {
     let [x0, y0, width, height] = scene.window;
