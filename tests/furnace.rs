@@ -1,5 +1,6 @@
 //! Furnaces: scenes whose radiance is the same known number everywhere, for every integrator, material and camera.
 
+#[allow(dead_code, reason = "tests share what not each of them needs")]
 mod scenes;
 
 use lightsieve::ray::Backend;

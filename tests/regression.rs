@@ -1,9 +1,10 @@
 //! Traps that other renderers fell into (pbrt-v3 issue 229, pbrt-v4 issue 347 and others), and bugs found here: one test each.
 
+#[allow(dead_code, reason = "tests share what not each of them needs")]
 mod scenes;
 
 use lightsieve::ray::Backend;
-use scenes::{Picture, parse, prepare, takes, unbiased};
+use scenes::{Picture, parse, prepare, sampled_by_pixel, takes, unbiased};
 
 /// A camera above the plane z = 0.
 fn camera(width: u32, height: u32, filter: &str) -> String {
@@ -44,7 +45,7 @@ fn shining_sides(mesh: &str, scale: [i32; 3]) -> [bool; 2] {
             <emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>"#
         );
         let scene = prepare(parse(&xml, &[("square.ply", mesh)]), Backend::default_available(), None);
-        let seen: Vec<bool> = unbiased()
+        let seen: Vec<bool> = sampled_by_pixel()
             .filter(|s| takes(s, &scene))
             .map(|spec| {
                 let picture = Picture::render(spec, &scene, &[], 8, 1);
@@ -87,7 +88,7 @@ fn a_crop_window_keeps_the_brightness() {
     for crop in [[0, 0, 6, 6], [6, 6, 6, 6], [3, 5, 1, 1], [11, 0, 1, 12]] {
         let whole = prepare(parse(&xml, &[]), Backend::default_available(), None);
         let part = prepare(parse(&xml, &[]), Backend::default_available(), Some(crop));
-        for spec in unbiased().filter(|s| takes(s, &part)) {
+        for spec in sampled_by_pixel().filter(|s| takes(s, &part)) {
             let all = Picture::render(spec, &whole, &[], 64, 1);
             let picture = Picture::render(spec, &part, &[], 64, 100);
             let [x, y, width, height] = crop;
@@ -158,7 +159,7 @@ fn no_sample_is_lost_at_the_border() {
         for filter in ["box", "tent", "gaussian", "mitchell"] {
             let xml = camera(width, height, filter) + sky;
             let scene = prepare(parse(&xml, &[]), Backend::default_available(), None);
-            for spec in unbiased().filter(|s| takes(s, &scene)) {
+            for spec in sampled_by_pixel().filter(|s| takes(s, &scene)) {
                 let picture = Picture::render(spec, &scene, &[], 16, 1);
                 let exact = Picture::constant(1.0, (width * height) as usize);
                 picture.assert_agrees(&exact, 0.0, &format!("{}: {width} x {height}, {filter}", spec.name));

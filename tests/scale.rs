@@ -2,6 +2,7 @@
 
 #[path = "scenes/gallery.rs"]
 mod gallery;
+#[allow(dead_code, reason = "tests share what not each of them needs")]
 mod scenes;
 
 use gallery::{GALLERY, exhibit};

@@ -235,7 +235,7 @@ mod tests {
     fn splats_reproduce_the_filter() {
         for desc in ALL {
             let filter = PixelFilter::new(desc);
-            let (n, m) = (400, 50);
+            let (n, m) = (100, 2000);
             let (mut weight, mut first, mut second, mut f2) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
             for k in 0..12 * n {
                 let at = -6.0 + (k as f32 + 0.5) / n as f32;

@@ -171,3 +171,9 @@ pub fn chance(a: (f64, f64), b: (f64, f64), freedom: (f64, f64), tolerance: f64)
 pub fn unbiased() -> impl Iterator<Item = &'static IntegratorSpec> {
     lightsieve::integrators::REGISTRY.iter().copied().filter(|s| s.unbiased)
 }
+
+/// Those of [`unbiased`] that sample every pixel by itself. Light tracing alone leaves the pixels of a small or narrow picture to chance, too
+/// noisy for tests that look at a pixel after few samples.
+pub fn sampled_by_pixel() -> impl Iterator<Item = &'static IntegratorSpec> {
+    unbiased().filter(|s| s.name != "light")
+}

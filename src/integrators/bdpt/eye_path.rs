@@ -240,8 +240,11 @@ impl EyeHooks<'_, '_> {
         let (z, y) = (vertex.point, &light.point);
         let offset = y.p - z.p;
         let dist2 = offset.length_squared();
-        // Points that cannot be told apart have no direction between them.
-        if dist2 <= f32::MIN_POSITIVE {
+        // Points that cannot be told apart have no direction between them. And of a point that lies in another's plane up to the
+        // rounding of both, nobody can say on which side it is: two sides of one wall would see each other.
+        let clearance = 2.0 * (z.error + y.error);
+        let (above_z, above_y) = (z.ng.dot(offset).abs(), y.ng.dot(offset).abs());
+        if dist2 <= f32::MIN_POSITIVE || above_z <= clearance || above_y <= clearance {
             return;
         }
         let to_light = offset * (1.0 / dist2.sqrt());

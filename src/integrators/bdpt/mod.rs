@@ -52,7 +52,8 @@ pub(super) const HIDE_EMITTERS: ParamSpec = ParamSpec {
 pub(super) const TECHNIQUES: ParamSpec = ParamSpec {
     name: "techniques",
     about: "pairs light:eye of vertex numbers that are joined, e.g. all,-0:* (no hits of lights) or *:1 (light tracing)",
-    default: ParamDefault::Techniques("all"),
+    // Lights that the lens sees are met by eye walks, at every sample; splats of the light itself could only add noise.
+    default: ParamDefault::Techniques("-1:1"),
 };
 
 /// The registry's line.
@@ -411,14 +412,7 @@ impl Integrator for Bidirectional {
     fn replay(&mut self, iteration: &Iteration, (x, y): (u32, u32)) -> Replay {
         let scene = iteration.scene;
         self.weigher.techniques.set_light_paths(self.light_paths(scene));
-        if self.resampler.is_some() {
-            // What an iteration knows comes from those before it.
-            for index in 0..iteration.index {
-                self.prepare_resampling(&Iteration { index, ..*iteration });
-                self.learn();
-            }
-            self.prepare_resampling(iteration);
-        }
+        self.prepare_replay(iteration);
         let (mut worker, mut tracer, mut replay) =
             (Worker::new(), Tracer::new(&*scene.query), Replay { pixel: (x, y), ..Replay::default() });
         let mut seen = vec![];

@@ -1,7 +1,7 @@
 //! Resampled connections: many light sub-paths are traced once per iteration, and every eye vertex is connected to the one that
 //! matters for it (probabilistic connections, Popov et al. 2015; resampling-aware weights, Nabata et al. 2020).
 //!
-//! All vertices of M light sub-paths are candidates. At cache points ([`caches`]) each has a probability proportional to
+//! All vertices of M light sub-paths are candidates. At cache points (`caches.rs`) each has a probability proportional to
 //! what it brings there, visibility included. An eye vertex z draws from the mixture
 //!
 //! P(y | z) = Σ_i P_i(y) / (n + 1) + 1 / ((n + 1) V)
@@ -150,6 +150,8 @@ pub(in crate::integrators) struct Resampler {
     pending: Vec<f64>,
     /// Sum over sets of the number of vertices, and of sub-paths.
     seen: [u64; 2],
+    /// Seed and iteration that replays are prepared for.
+    ready: Option<(u64, u64)>,
 }
 
 /// The side of a point's surface on which the direction `d` leaves it.
@@ -167,6 +169,7 @@ impl Resampler {
             pmfs: Pmfs::default(),
             pending: vec![],
             seen: [0; 2],
+            ready: None,
         }
     }
 
@@ -300,6 +303,25 @@ impl Bidirectional {
         resampler.store = store;
         stats.phases.merge(&phases);
         stats
+    }
+
+    /// Gets the candidates of an iteration ready as they were when it was rendered; once for any number of pixels.
+    pub(in crate::integrators) fn prepare_replay(&mut self, iteration: &Iteration) {
+        let Some(resampler) = &mut self.resampler else { return };
+        let wanted = (iteration.seed, iteration.index);
+        if resampler.ready == Some(wanted) {
+            return;
+        }
+        *resampler = Resampler::new(resampler.settings);
+        // What an iteration knows comes from those before it.
+        for index in 0..iteration.index {
+            self.prepare_resampling(&Iteration { index, ..*iteration });
+            self.learn();
+        }
+        self.prepare_resampling(iteration);
+        if let Some(resampler) = &mut self.resampler {
+            resampler.ready = Some(wanted);
+        }
     }
 
     /// The iteration is over: its irradiances may now be known.
