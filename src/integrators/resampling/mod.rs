@@ -27,13 +27,11 @@ use crate::shade::SurfacePoint;
 use caches::{Caches, Pmfs};
 use store::LightStore;
 
-const fn paths(default: i64) -> ParamSpec {
-    ParamSpec {
-        name: "paths",
-        about: "M, light sub-paths per iteration from which eye vertices draw",
-        default: ParamDefault::Int(default, 1, 10_000_000),
-    }
-}
+const PATHS: ParamSpec = ParamSpec {
+    name: "paths",
+    about: "M, light sub-paths per iteration from which eye vertices draw",
+    default: ParamDefault::Int(200, 1, 10_000_000),
+};
 const SAMPLES: ParamSpec =
     ParamSpec { name: "samples", about: "N, draws of each eye vertex", default: ParamDefault::Int(1, 1, 1024) };
 const NEIGHBOURS: ParamSpec = ParamSpec {
@@ -59,6 +57,25 @@ const fn weights(default: &'static str) -> ParamSpec {
     }
 }
 
+/// The parameters of all resampled methods; they differ in the weights they take by default.
+const fn parameters(default_weights: &'static str) -> [ParamSpec; 10] {
+    [
+        MAX_DEPTH,
+        RR_DEPTH,
+        HIDE_EMITTERS,
+        TECHNIQUES,
+        PATHS,
+        SAMPLES,
+        NEIGHBOURS,
+        CACHES,
+        EPSILON,
+        weights(default_weights),
+    ]
+}
+
+const PCBPT_PARAMS: [ParamSpec; 10] = parameters("balance");
+const RIS_PARAMS: [ParamSpec; 10] = parameters("ris");
+
 fn build(params: &Params) -> Box<dyn super::Integrator> {
     let settings = Settings {
         paths: params.int("paths") as u32,
@@ -78,18 +95,7 @@ pub static PCBPT: IntegratorSpec = IntegratorSpec {
     name: "pcbpt",
     aliases: &[],
     about: "Probabilistic connections: eye vertices draw from many light sub-paths by what these bring to nearby cache points; weights of bidirectional path tracing",
-    params: &[
-        MAX_DEPTH,
-        RR_DEPTH,
-        HIDE_EMITTERS,
-        TECHNIQUES,
-        paths(200),
-        SAMPLES,
-        NEIGHBOURS,
-        CACHES,
-        EPSILON,
-        weights("balance"),
-    ],
+    params: &PCBPT_PARAMS,
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
@@ -101,18 +107,7 @@ pub static RIS: IntegratorSpec = IntegratorSpec {
     name: "ris",
     aliases: &["risbpt"],
     about: "Resampled connections with resampling-aware weights (RISBPT): as pcbpt, with weights that know the density which resampling makes",
-    params: &[
-        MAX_DEPTH,
-        RR_DEPTH,
-        HIDE_EMITTERS,
-        TECHNIQUES,
-        paths(200),
-        SAMPLES,
-        NEIGHBOURS,
-        CACHES,
-        EPSILON,
-        weights("ris"),
-    ],
+    params: &RIS_PARAMS,
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
