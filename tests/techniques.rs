@@ -65,7 +65,10 @@ fn moments(renders: &[Vec<f64>]) -> Vec<(f64, f64)> {
 fn each_technique_alone_makes_the_same_picture() {
     let few: &[(&str, &str)] = &[("paths", "7"), ("caches", "50000")];
     let many: &[(&str, &str)] = &[("paths", "300"), ("caches", "50000"), ("samples", "2")];
-    for (spec, params) in [(&bdpt::SPEC, &[][..]), (&resampling::RIS, few), (&resampling::PCBPT, many)] {
+    let two: &[(&str, &str)] = &[("paths", "100"), ("caches", "50000"), ("second_stage", "16")];
+    for (spec, params) in
+        [(&bdpt::SPEC, &[][..]), (&resampling::RIS, few), (&resampling::PCBPT, many), (&resampling::TWO_STAGE, two)]
+    {
         techniques_agree(spec, params);
     }
 }

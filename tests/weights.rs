@@ -11,7 +11,7 @@ use lightsieve::integrators::replay::Contribution;
 use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, resampling};
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
 use lightsieve::mis::definition::{Densities, densities};
-use lightsieve::mis::{Heuristic, Joint, Node, Split, Techniques, Weigher};
+use lightsieve::mis::{Heuristic, Joint, Node, Split, Targets, Techniques, Weigher};
 use lightsieve::path::FullPath;
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
@@ -81,7 +81,9 @@ fn resampling_aware_weights_are_those_of_the_definition() {
             let paths = ["200", "7", "1"][i % 3];
             // A film of 64 pixels needs more than its share of cache points.
             let params = [("techniques", techniques), ("rr_depth", roulette), ("paths", paths), ("caches", "50000")];
-            for c in found(&resampling::RIS, &scene, &params, 2) {
+            let two_stage = [&params[..], &[("second_stage", ["16", "1", "200"][i % 3])]].concat();
+            let one = found(&resampling::RIS, &scene, &params, 2);
+            for c in one.into_iter().chain(found(&resampling::TWO_STAGE, &scene, &two_stage, 2)) {
                 let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
                 let what = format!("{name} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
                 assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
@@ -91,7 +93,7 @@ fn resampling_aware_weights_are_those_of_the_definition() {
             }
         }
     }
-    assert!(checked > 4000 && connections > 1000, "{checked} {connections}");
+    assert!(checked > 8000 && connections > 2000, "{checked} {connections}");
 }
 
 /// Weight of the technique with s light vertices, evaluated as if it had sampled the path. What the evaluation must not look at is
@@ -144,7 +146,7 @@ fn weights_of_all_techniques_sum_to_one() {
         for path in &paths {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
                 let weigher = weigher(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], 5);
-                let d = densities(&scene, &weigher, &|_, _| 0.0, path);
+                let d = densities(&scene, &weigher, &|_, _| Targets::default(), path);
                 let slow = d.weights(&weigher);
                 // A subset need not have any technique that makes the path; single precision has no densities beyond its range.
                 let extreme = |p: &f64| *p > 0.0 && !(1e-15..1e15).contains(p);

@@ -18,7 +18,7 @@ use crate::ray::RayStats;
 
 /// Every integrator, by name.
 pub static REGISTRY: &[&IntegratorSpec] =
-    &[&path::SPEC, &light::SPEC, &bdpt::SPEC, &resampling::PCBPT, &resampling::RIS];
+    &[&path::SPEC, &light::SPEC, &bdpt::SPEC, &resampling::PCBPT, &resampling::RIS, &resampling::TWO_STAGE];
 
 /// What the registry knows of an integrator.
 pub struct IntegratorSpec {

@@ -1,8 +1,8 @@
 //! One sample, run again and written down: the tool with which a firefly or a value that is not finite is explained.
 
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
-use crate::mis::Weigher;
 use crate::mis::definition::densities;
+use crate::mis::{Targets, Weigher};
 use crate::path::{FullPath, Interior, Origin, SurfaceVertex};
 use crate::prepared::PreparedScene;
 use crate::shade::{BsdfSample, SurfacePoint};
@@ -107,17 +107,17 @@ impl Replay {
 
     /// Notes a contribution and its path; returns its number.
     ///
-    /// `irradiance` is the Q at a point, on the side of a direction, of integrators whose weights know of resampling.
+    /// `there` is the Q of both targets at a point, on the side of a direction, of integrators whose weights know of resampling.
     pub fn found(
         &mut self,
         scene: &PreparedScene,
         weigher: &Weigher,
-        irradiance: &dyn Fn(&SurfacePoint, Vec3) -> f32,
+        there: &dyn Fn(&SurfacePoint, Vec3) -> Targets,
         mut contribution: Contribution,
         path: Option<FullPath>,
     ) -> u32 {
         if let Some(path) = &path {
-            let densities = densities(scene, weigher, irradiance, path);
+            let densities = densities(scene, weigher, there, path);
             contribution.techniques =
                 densities.log_shares(weigher).into_iter().zip(densities.weights(weigher)).collect();
         }

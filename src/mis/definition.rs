@@ -1,7 +1,7 @@
 //! The weights of a path by their definition: all densities of all its vertices from both ends, multiplied up in double
 //! precision logarithms (Veach 1997, §10.2). The oracle of [`Weigher`], and what explains a single sample.
 
-use super::{Weigher, spread};
+use super::{Targets, Weigher, spread};
 use crate::emit::LightEnd;
 use crate::math::{Rgb, Vec3};
 use crate::path::{FullPath, survival};
@@ -23,12 +23,12 @@ pub struct Densities {
     pub factors: Vec<f64>,
 }
 
-/// Densities of `path` where sub-paths play roulette as `weigher` says. `irradiance` is Q at a point, on the side of a direction; only
-/// weights that know of resampling ask for it.
+/// Densities of `path` where sub-paths play roulette as `weigher` says. `there` is Q of both targets at a point, on the side of a
+/// direction; only weights that know of resampling ask for it.
 pub fn densities(
     scene: &PreparedScene,
     weigher: &Weigher,
-    irradiance: &dyn Fn(&SurfacePoint, Vec3) -> f32,
+    there: &dyn Fn(&SurfacePoint, Vec3) -> Targets,
     path: &FullPath,
 ) -> Densities {
     let k = path.edges();
@@ -99,9 +99,13 @@ pub fn densities(
             let (from, to) = (-path.edge(i - 2).0, path.edge(i - 1).0);
             let value = v.delta.map_or_else(|| v.bsdf.eval(from, to, Transport::Importance), |(_, value)| value);
             let scattered: [f64; 3] = std::array::from_fn(|c| arriving[c] * f64::from(value[c]));
-            let brings = Rgb::from(scattered.map(|v| (v * to_area(i, i - 1)) as f32)).luminance();
+            let luminance = |light: [f64; 3]| Rgb::from(light.map(|v| (v * to_area(i, i - 1)) as f32)).luminance();
+            let brings = Targets {
+                scattered: luminance(scattered),
+                unscattered: luminance(arriving) * v.point.ng.dot(to).abs(),
+            };
             arriving = scattered.map(|v| v / scatter(i - 1, from, to, true));
-            *factor = f64::from(resampled.factor(brings, irradiance(&path.interior[i - 1].point, -to)));
+            *factor = f64::from(resampled.factor(brings, there(&path.interior[i - 1].point, -to)));
         }
     }
     Densities { light: from_light, eye: from_eye, joinable, next_event, factors }

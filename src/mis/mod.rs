@@ -14,7 +14,7 @@ pub mod side;
 pub mod techniques;
 pub mod weigh;
 
-pub use resampled::Resampled;
+pub use resampled::{Resampled, Targets};
 pub use side::{Node, Side, spread};
 pub use techniques::{Techniques, TechniquesError};
 pub use weigh::{Joint, Split, Weigher};

@@ -11,14 +11,33 @@
 //! drawn sub-path says of that irradiance, q/p = a/Q. The pmf is a mixture with a uniform one, whose share is u; L vertices per
 //! sub-path then make q/p = (1 − u) a/Q + u/L.
 //!
+//! Two stages draw M₂ of the sub-paths by q̂₁ = f_y G first, and one of these by q̂₂ = q̂ (Nabata et al. 2020, "Two-stage
+//! resampling", eq. 17):
+//!
+//! c = [ 1/M + (1 − 1/M) ( (1/M₂) p/q₁ + (1 − 1/M₂) p/q₂ ) ]⁻¹.
+//!
+//! The uniform share is one over the M₂, which are distributed as q₁: q₂/p = (1 − u) a₂/Q₂ + u a₁/Q₁.
+//!
 //! A weight may use any Q that does not depend on the sub-paths it weighs: an estimate from earlier iterations. It need not be good for
-//! the result to be right; the ratio p/q is clamped from below so that a bad one costs a bounded variance.
+//! the result to be right; the ratios p/q are clamped from below so that a bad one costs a bounded variance.
+
+/// Two functions of a light sub-path and a place that resampling aims at: each over the sub-path's density (what the sub-path brings), or
+/// integrated over all sub-paths (what there is). Luminance per unit area.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Targets {
+    /// q̂₂ = f_y ρ G V: light that is scattered at y_{s−1} towards the place.
+    pub scattered: f32,
+    /// q̂₁ = f_y G: the BSDF at y_{s−1} left out.
+    pub unscattered: f32,
+}
 
 /// How connections are resampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resampled {
     /// M.
     pub paths: f32,
+    /// M₂, if there are two stages.
+    pub second_stage: Option<f32>,
     /// Smallest p/q.
     pub epsilon: f32,
     /// u.
@@ -28,17 +47,26 @@ pub struct Resampled {
 }
 
 impl Resampled {
-    /// c for a sub-path that brings `a` to a place with the irradiance `irradiance`.
+    /// c for a sub-path that brings `brings` to a place where there is `there`.
     #[inline]
-    pub fn factor(&self, a: f32, irradiance: f32) -> f32 {
-        if self.vertices_per_path <= 0.0 {
+    pub fn factor(&self, brings: Targets, there: Targets) -> f32 {
+        if self.vertices_per_path <= 0.0 || self.paths <= 1.0 {
             return 1.0;
         }
-        let uniform = 1.0 / self.vertices_per_path;
-        // Where no light is known of, all of the mixture is uniform.
-        let q_over_p =
-            if irradiance > 0.0 { (1.0 - self.uniform) * a / irradiance + self.uniform * uniform } else { uniform };
-        let p_over_q = (1.0 / q_over_p).max(self.epsilon);
+        let by_number = 1.0 / self.vertices_per_path;
+        // A defensive share that is spread over everything. Where no light is known of, all of the mixture is.
+        let mixed = |share: f32| match there.scattered > 0.0 {
+            true => (1.0 - self.uniform) * brings.scattered / there.scattered + self.uniform * share,
+            false => share,
+        };
+        let p_over = |q_over_p: f32| (1.0 / q_over_p).clamp(self.epsilon, f32::MAX);
+        let p_over_q = match self.second_stage {
+            None => p_over(mixed(by_number)),
+            Some(m2) => {
+                let first = if there.unscattered > 0.0 { brings.unscattered / there.unscattered } else { by_number };
+                p_over(first) / m2 + (1.0 - 1.0 / m2) * p_over(mixed(first))
+            }
+        };
         let m = 1.0 / self.paths;
         1.0 / (m + (1.0 - m) * p_over_q)
     }
@@ -49,26 +77,49 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const ONE_STAGE: Resampled =
+        Resampled { paths: 200.0, second_stage: None, epsilon: 1e-3, uniform: 0.25, vertices_per_path: 3.0 };
+
+    fn lit(scattered: f32) -> Targets {
+        Targets { scattered, unscattered: 0.0 }
+    }
+
     proptest! {
         #[test]
         fn one_path_is_not_resampled(a in 0.0f32..1e6, q in 0.0f32..1e6, l in 0.1f32..20.0) {
-            let r = Resampled { paths: 1.0, epsilon: 1e-3, uniform: 0.25, vertices_per_path: l };
-            prop_assert_eq!(r.factor(a, q), 1.0);
+            let r = Resampled { paths: 1.0, vertices_per_path: l, ..ONE_STAGE };
+            prop_assert_eq!(r.factor(lit(a), lit(q)), 1.0);
+            prop_assert_eq!(Resampled { second_stage: Some(1.0), ..r }.factor(lit(a), lit(q)), 1.0);
         }
 
         #[test]
-        fn factors_grow_with_light_and_stay_bounded(a in 0.0f32..1e6, b in 0.0f32..1e6, q in 1e-6f32..1e6, m in 1.0f32..1e5) {
-            let r = Resampled { paths: m, epsilon: 1e-3, uniform: 0.25, vertices_per_path: 3.0 };
-            let (x, y) = (r.factor(a.min(b), q), r.factor(a.max(b), q));
-            prop_assert!(x <= y && x > 0.0 && y <= 1001.0);
+        fn factors_grow_with_light_and_stay_bounded(
+            a in 0.0f32..1e6, b in 0.0f32..1e6, q in 1e-6f32..1e6, m in 1.0f32..1e5, a1 in 0.0f32..1e6, q1 in 0.0f32..1e6, two: bool
+        ) {
+            let r = Resampled { paths: m, second_stage: two.then_some(m.sqrt()), ..ONE_STAGE };
+            let brings = |scattered| Targets { scattered, unscattered: a1 };
+            let there = Targets { scattered: q, unscattered: q1 };
+            let (x, y) = (r.factor(brings(a.min(b)), there), r.factor(brings(a.max(b)), there));
+            prop_assert!(x <= y && x >= 0.0 && y <= 1001.0);
+        }
+
+        /// A first stage that draws but one sub-path decides alone; one that draws very many decides nothing.
+        #[test]
+        fn two_stages_lie_between_their_targets(a in 1e-3f32..1e3, a1 in 1e-3f32..1e3) {
+            let (brings, there) = (Targets { scattered: a, unscattered: a1 }, Targets { scattered: 2.0, unscattered: 5.0 });
+            let r = |m2: f32| Resampled { uniform: 0.0, second_stage: Some(m2), ..ONE_STAGE }.factor(brings, there);
+            let first = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a1), lit(5.0));
+            let second = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a), lit(2.0));
+            prop_assert!((r(1.0) - first).abs() < 1e-4 * first);
+            prop_assert!((r(1e9) - second).abs() < 1e-4 * second);
         }
     }
 
     #[test]
     fn many_paths_reach_the_target() {
-        let r = Resampled { paths: 1e9, epsilon: 1e-3, uniform: 0.0, vertices_per_path: 3.0 };
-        assert!((r.factor(6.0, 2.0) - 3.0).abs() < 1e-5);
-        assert_eq!(Resampled { vertices_per_path: 0.0, ..r }.factor(6.0, 2.0), 1.0);
-        assert_eq!(r.factor(5.0, 0.0), Resampled { uniform: 1.0, ..r }.factor(5.0, 2.0));
+        let r = Resampled { paths: 1e9, uniform: 0.0, ..ONE_STAGE };
+        assert!((r.factor(lit(6.0), lit(2.0)) - 3.0).abs() < 1e-5);
+        assert_eq!(Resampled { vertices_per_path: 0.0, ..r }.factor(lit(6.0), lit(2.0)), 1.0);
+        assert_eq!(r.factor(lit(5.0), lit(0.0)), Resampled { uniform: 1.0, ..r }.factor(lit(5.0), lit(2.0)));
     }
 }

@@ -7,6 +7,7 @@
 //! Densities of a vertex at infinity are per steradian of its direction; the disk that emission rays start on stands in for
 //! the direction's density at the next vertex (see `emit::sample`). [`Node::spread`] hides the difference.
 
+use super::Targets;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 
 /// A vertex of one side.
@@ -28,8 +29,10 @@ pub struct Node {
     pub smooth: bool,
     /// Light side: c of the connection that ends at this vertex, see `mis::resampled`.
     pub factor: f32,
-    /// Eye side: irradiance Q at this vertex, on the side that the walk goes on to.
-    pub irradiance: f32,
+    /// Eye side: Q of both targets at this vertex, on the side that the walk goes on to.
+    pub there: Targets,
+    /// Eye side: |cos| at this vertex between its surface's normal and the edge to the vertex before.
+    pub cos: f32,
     /// Eye side: value of this vertex for a walk from the light, cosine weighted.
     pub adjoint: Rgb,
     /// Eye side: density per steradian with which a walk from the light would go on from here to the vertex before.
@@ -45,7 +48,8 @@ impl Node {
             ratio: 0.0,
             smooth: true,
             factor: 1.0,
-            irradiance: 0.0,
+            there: Targets::default(),
+            cos: 0.0,
             adjoint: Rgb::BLACK,
             reverse: 0.0,
         }

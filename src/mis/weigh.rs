@@ -14,7 +14,7 @@
 //! resampled connection; all others are 1, or 0 if an end of the connection is a delta event. Roulette is part of the densities: where it is played is counted from the end that walks.
 
 use super::side::Node;
-use super::{Heuristic, Resampled, Techniques};
+use super::{Heuristic, Resampled, Targets, Techniques};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 
 /// How the last vertex of a side would have been walked through from the other end.
@@ -128,11 +128,15 @@ impl Weigher {
             false => (node.adjoint, node.reverse),
         };
         let scattered = *arriving * adjoint;
+        let brings = Targets {
+            scattered: scattered.luminance() * node.spread,
+            unscattered: arriving.luminance() * node.cos * node.spread,
+        };
         *arriving = scattered * (1.0 / (reverse * self.survival(node, t - 1 - n + s)));
         if n < 2 {
             return 1.0;
         }
-        resampled.factor(scattered.luminance() * node.spread, eye[n - 1].irradiance)
+        resampled.factor(brings, eye[n - 1].there)
     }
 
     /// The weight of the technique that sampled the path.

@@ -18,10 +18,20 @@ pub fn code(p: Vec3, lo: Vec3, hi: Vec3) -> u32 {
     spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2
 }
 
+fn bounds(points: &[Vec3]) -> [Vec3; 2] {
+    [points.iter().copied().fold(Vec3::INFINITY, Vec3::min), points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max)]
+}
+
+/// Places of all `points` on the curve through the box around them, left in `out`.
+pub fn codes(points: &[Vec3], out: &mut Vec<u32>) {
+    let [lo, hi] = bounds(points);
+    out.clear();
+    out.extend(points.iter().map(|p| code(*p, lo, hi)));
+}
+
 /// Numbers of `points` in Morton order.
 pub fn order(points: &[Vec3]) -> Vec<u32> {
-    let lo = points.iter().copied().fold(Vec3::INFINITY, Vec3::min);
-    let hi = points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+    let [lo, hi] = bounds(points);
     let mut keys: Vec<(u32, u32)> = points.iter().zip(0..).map(|(p, i)| (code(*p, lo, hi), i)).collect();
     keys.sort_unstable();
     keys.into_iter().map(|(_, i)| i).collect()

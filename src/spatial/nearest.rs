@@ -7,6 +7,7 @@
 //! Points whose surface faces another way count as far: a point on the other side of a thin wall is near, but sees another room.
 
 use crate::math::Vec3;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Most neighbours that are found.
@@ -30,10 +31,12 @@ pub struct NearestPoints {
     per_cell: f32,
     cells: [usize; 3],
     slots: Vec<AtomicU64>,
+    /// For each point, its group, if neighbours must be of one.
+    groups: Option<Vec<Range<usize>>>,
 }
 
 /// Which of ±x, ±y, ±z `n` is nearest to.
-fn facing(n: Vec3) -> usize {
+pub fn facing(n: Vec3) -> usize {
     let a = n.abs();
     let axis = if a.x >= a.y && a.x >= a.z {
         0
@@ -48,6 +51,11 @@ fn facing(n: Vec3) -> usize {
 fn direction(facing: usize) -> Vec3 {
     let sign = if facing.is_multiple_of(2) { 1.0 } else { -1.0 };
     [Vec3::X, Vec3::Y, Vec3::Z][facing / 2] * sign
+}
+
+/// Whether a point with the normal `n` is found by those that face that way.
+fn faces(n: Vec3, facing: usize) -> bool {
+    n.dot(direction(facing)) > 0.2
 }
 
 /// Orders `numbers` so that the middle of every range splits it along the axis of its depth.
@@ -104,8 +112,7 @@ impl NearestPoints {
     pub fn new(points: Vec<Vec3>, normals: Vec<Vec3>) -> NearestPoints {
         let most = points.len().min(normals.len()).min(NOBODY as usize);
         let trees = std::array::from_fn(|f| {
-            let mut tree: Vec<u32> =
-                (0..most as u32).filter(|&i| normals[i as usize].dot(direction(f)) > 0.2).collect();
+            let mut tree: Vec<u32> = (0..most as u32).filter(|&i| faces(normals[i as usize], f)).collect();
             build_tree(&points, &mut tree, 0);
             tree
         });
@@ -115,7 +122,13 @@ impl NearestPoints {
         let per_cell = CELLS as f32 / size.max_element().max(f32::MIN_POSITIVE);
         let cells = (size * per_cell).to_array().map(|s| (s.ceil() as usize).clamp(1, CELLS));
         let slots = (0..cells.iter().product::<usize>() * 6).map(|_| AtomicU64::new(0)).collect();
-        NearestPoints { points, normals, trees, lo, per_cell, cells, slots }
+        NearestPoints { points, normals, trees, lo, per_cell, cells, slots, groups: None }
+    }
+
+    /// From now on only points of the nearest one's group are found; `groups` are ranges that have every point in one of them.
+    pub fn within_groups(mut self, groups: &[Range<usize>]) -> NearestPoints {
+        self.groups = Some(groups.iter().flat_map(|g| std::iter::repeat_n(g.clone(), g.len())).collect());
+        self
     }
 
     /// Number of points.
@@ -161,6 +174,12 @@ impl NearestPoints {
         let middle = self.lo + Vec3::from(cell.map(|c| c as f32 + 0.5)) / self.per_cell;
         let mut best = Best { distance2: [f32::INFINITY; MOST], number: [NOBODY; MOST] };
         search(&self.points, &self.trees[facing], 0, middle, &mut best);
+        if let Some(group) = self.groups.as_ref().and_then(|groups| groups.get(best.number[0] as usize)) {
+            best = Best { distance2: [f32::INFINITY; MOST], number: [NOBODY; MOST] };
+            for i in group.clone().filter(|&i| faces(self.normals[i], facing)) {
+                best.offer(middle.distance_squared(self.points[i]), i as u32);
+            }
+        }
         best.number.iter().zip(0..).fold(KNOWN, |slot, (n, i)| slot | n << (i * BITS))
     }
 }
@@ -187,6 +206,8 @@ mod tests {
             })
             .collect();
         let index = NearestPoints::new(points.clone(), normals.clone());
+        let groups: Vec<Range<usize>> = (0..300).map(|g| g * 10..g * 10 + 10).collect();
+        let grouped = NearestPoints::new(points.clone(), normals.clone()).within_groups(&groups);
         for _ in 0..500 {
             let [x, y, z, w] = rng.next_4();
             let (p, f) = (Vec3::new(x * 6.0 - 0.5, y * 4.0 - 0.5, z * 2.0 - 0.5), (w * 6.0) as usize);
@@ -198,8 +219,10 @@ mod tests {
                 let d = |i: usize| middle.distance_squared(points[i]);
                 d(a).total_cmp(&d(b)).then(a.cmp(&b))
             });
+            let of_group: Vec<usize> = all.iter().copied().filter(|i| i / 10 == all[0] / 10).take(MOST).collect();
             for _ in 0..2 {
                 assert_eq!(index.find(p, direction(f)).collect::<Vec<_>>(), all[..MOST]);
+                assert_eq!(grouped.find(p, direction(f)).collect::<Vec<_>>(), of_group);
             }
         }
     }

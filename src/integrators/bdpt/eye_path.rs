@@ -9,7 +9,7 @@ use crate::integrators::replay::{Contribution, Replay};
 use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{Joint, Node, Side, Split, spread};
+use crate::mis::{Joint, Node, Side, Split, Targets, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment, survival};
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
@@ -110,8 +110,8 @@ impl EyeHooks<'_, '_> {
                 record.light = LightStore::retrace(this, iteration, number);
             }
             let path = origin.map(|origin| record.path(origin, s, n_eye, lens));
-            let irradiance = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(0.0, |r| r.irradiance(p, d));
-            record.found(scene, weigher, &irradiance, Contribution::new((s, t), pixel, raw, weight), path)
+            let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(Targets::default(), |r| r.there(p, d));
+            record.found(scene, weigher, &there, Contribution::new((s, t), pixel, raw, weight), path)
         });
         Found { x: pixel.0, y: pixel.1, path: 0, note, s: s as u16, t: t as u16, raw, weight }
     }
@@ -261,12 +261,16 @@ impl EyeHooks<'_, '_> {
         let eye_pdf = eye_pdf.0 * limits.survival(vertex.index, vertex.bsdf);
         let light_pdf = light_pdf.0 * limits.survival(light.s as u32 - 1, &light.bsdf);
         let back = vertex.bsdf.eval_and_pdf(to_light, vertex.wo, Transport::Importance);
-        let arriving = light.throughput * at_light * (1.0 / light_pdf);
-        let arrival = light_pdf * spread(z.ng.dot(to_light), dist2);
-        let factor =
-            self.this.resampler.as_ref().map_or(1.0, |resampler| {
-                resampler.factor(&self.this.weigher, arriving.luminance() * arrival, z, to_light)
-            });
+        let scattered = light.throughput * at_light;
+        let arriving = scattered * (1.0 / light_pdf);
+        let spread_z = spread(z.ng.dot(to_light), dist2);
+        let factor = self.this.resampler.as_ref().map_or(1.0, |resampler| {
+            let brings = Targets {
+                scattered: scattered.luminance() * spread_z,
+                unscattered: light.throughput.luminance() * y.ng.dot(to_light).abs() * spread_z,
+            };
+            resampler.factor(&self.this.weigher, brings, z, to_light)
+        });
         let split = Split {
             light: to.nodes,
             light_joint: Joint {
@@ -274,7 +278,7 @@ impl EyeHooks<'_, '_> {
                 departure: light.bsdf.pdf(-to_light, light.wo, Transport::Radiance),
             },
             eye: self.side.first(t),
-            eye_joint: Joint { arrival: AreaPdf(arrival), departure: back.1 },
+            eye_joint: Joint { arrival: AreaPdf(light_pdf * spread_z), departure: back.1 },
             next_event: to.next_event,
             light_can_be_hit: to.light_can_be_hit,
             factor,
@@ -296,8 +300,12 @@ impl WalkHooks for EyeHooks<'_, '_> {
     fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
         let (point, edge) = (vertex.point, vertex.edge);
         let dist2 = edge.distance * edge.distance;
-        let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(point.ng.dot(vertex.wo), dist2);
+        let cos = point.ng.dot(vertex.wo);
+        let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
         self.side.arrive(forward, spread(self.cos_leaving, dist2), survival(vertex.bsdf));
+        if let Some(node) = self.side.last_mut() {
+            node.cos = cos.abs();
+        }
         if let Some(record) = &mut self.record {
             record.vertex(true, vertex);
         }
@@ -352,7 +360,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
         };
         self.side.leave(reverse, sample.delta);
         if let (Some(resampler), Some(node)) = (&self.this.resampler, self.side.last_mut()) {
-            node.irradiance = resampler.irradiance(vertex.point, sample.wi);
+            node.there = resampler.there(vertex.point, sample.wi);
             let value = if sample.delta {
                 sample.reverse_delta
             } else {

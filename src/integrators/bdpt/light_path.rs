@@ -5,7 +5,7 @@ use crate::emit::{EmissionSample, LensSample, LightEnd, LightId};
 use crate::integrators::replay::{Contribution, Replay};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{Joint, Node, Side, Split, spread};
+use crate::mis::{Joint, Node, Side, Split, Targets, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, survival, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
@@ -65,8 +65,19 @@ pub(in crate::integrators) fn trace(
     out.light_can_be_hit = !light.is_delta();
     let flux = emission.flux() * (1.0 / chosen.0);
     out.origin = Some(Origin { light: id, end: emission.end, leaving: emission.direction, flux });
-    let mut hooks =
-        LightHooks { this, scene, id, chosen, emission: &emission, cos_leaving: 0.0, out, lens, record, keep };
+    let mut hooks = LightHooks {
+        this,
+        scene,
+        id,
+        chosen,
+        emission: &emission,
+        cos_leaving: 0.0,
+        luminance_before: 0.0,
+        out,
+        lens,
+        record,
+        keep,
+    };
     hooks.emitter_to_lens([v[2], v[3]], tracer, sampler);
     if flux.is_black() || this.limits.max_edges < 2 {
         return;
@@ -106,6 +117,8 @@ struct LightHooks<'a, 'q> {
     emission: &'a EmissionSample,
     /// |cos| at the vertex before, between its geometric normal and the edge.
     cos_leaving: f32,
+    /// Luminance of β_L on arriving at the vertex before.
+    luminance_before: f32,
     out: &'a mut LightPath,
     lens: Option<&'a mut LensQueue<'q>>,
     record: Option<&'a mut Replay>,
@@ -142,8 +155,8 @@ impl LightHooks<'_, '_> {
         let (origin, resampler) = (self.out.origin, &self.this.resampler);
         let note = self.record.as_mut().map_or(0, |record| {
             let path = origin.map(|o| record.path(Origin { leaving, ..o }, s, 0, lens.p));
-            let irradiance = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(0.0, |r| r.irradiance(p, d));
-            record.found(scene, weigher, &irradiance, Contribution::new((s, 1), (x, y), raw, weight), path)
+            let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(Targets::default(), |r| r.there(p, d));
+            record.found(scene, weigher, &there, Contribution::new((s, 1), (x, y), raw, weight), path)
         });
         let Some(queue) = &mut self.lens else { return };
         let found = Found { x, y, note, path: queue.path, s: s as u16, t: 1, raw, weight };
@@ -285,7 +298,10 @@ impl WalkHooks for LightHooks<'_, '_> {
             self.out.side.arrive(forward, spread(self.cos_leaving, dist2), survival(vertex.bsdf));
             if let (Some(resampler), Some(node)) = (&self.this.resampler, self.out.side.last_mut()) {
                 // What the sub-path brings here is its throughput times the density of having come here.
-                let brings = vertex.throughput.luminance() * forward.0;
+                let brings = Targets {
+                    scattered: vertex.throughput.luminance() * forward.0,
+                    unscattered: self.luminance_before * self.cos_leaving.abs() * spread(cos, dist2),
+                };
                 node.factor = resampler.factor(&self.this.weigher, brings, point, vertex.wo);
             }
         }
@@ -315,6 +331,7 @@ impl WalkHooks for LightHooks<'_, '_> {
 
     fn leaving(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample) {
         self.cos_leaving = vertex.point.ng.dot(sample.wi);
+        self.luminance_before = vertex.throughput.luminance();
         let reverse = if sample.delta {
             sample.pdf_reverse_delta
         } else {

@@ -15,6 +15,7 @@ pub(super) mod eye_path;
 pub(super) mod light_path;
 
 use super::resampling::Resampler;
+use super::resampling::store::LightStore;
 use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params, Replay};
 use crate::film::{Film, FilmTile, LightImage, Part, Pyramid, SampleBuffer, Splat};
 use crate::math::Rgb;
@@ -84,8 +85,8 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
 /// The random streams of sub-paths.
 const EYE_STREAM: u64 = 1;
 const LIGHT_STREAM: u64 = 3;
-/// Light sub-paths in a piece of work outside of the window.
-const LIGHT_PATHS_AT_ONCE: u32 = 1024;
+/// Light sub-paths in a piece of work that has no eye sub-paths.
+const LIGHT_PATHS_AT_ONCE: u32 = 512;
 
 /// A contribution with its technique.
 #[derive(Clone, Copy, Debug, Default)]
@@ -134,7 +135,7 @@ struct Worker {
 }
 
 /// What a worker brings back from a piece of work.
-type Piece = (RayStats, Vec<Splat>, Vec<Found>);
+pub(in crate::integrators) type Piece = (RayStats, Vec<Splat>, Vec<Found>);
 
 impl Worker {
     fn new() -> Worker {
@@ -192,6 +193,12 @@ impl Bidirectional {
         scene.film_size[0] as f32 * scene.film_size[1] as f32
     }
 
+    /// Random numbers of light sub-path `path`.
+    pub(in crate::integrators) fn light_sampler(&self, iteration: &Iteration, path: u32) -> PathSampler {
+        // The sub-paths of one iteration are points of one sequence: they are stratified among themselves.
+        PathSampler::new(iteration.seed, LIGHT_STREAM, iteration.index, u64::from(path))
+    }
+
     /// One light sub-path and its splats.
     fn light_path(
         &self,
@@ -200,9 +207,9 @@ impl Bidirectional {
         worker: &mut Worker,
         tracer: &mut Tracer,
         record: Option<&mut Replay>,
+        keep_vertices: bool,
     ) {
-        // The sub-paths of one iteration are points of one sequence: they are stratified among themselves.
-        let mut sampler = PathSampler::new(iteration.seed, LIGHT_STREAM, iteration.index, u64::from(path));
+        let mut sampler = self.light_sampler(iteration, path);
         let (splats, all, keep) = (&mut worker.splats, &mut worker.found, self.pyramid.is_some());
         let mut found = |found: Found| {
             splats.push(splat(found));
@@ -219,7 +226,7 @@ impl Bidirectional {
             &mut worker.light,
             Some(&mut lens),
             record,
-            self.connects,
+            keep_vertices,
         );
     }
 
@@ -264,6 +271,48 @@ impl Bidirectional {
         walk(scene, start, &self.limits, Transport::Radiance, tracer, &mut sampler, &mut hooks);
     }
 
+    /// All light sub-paths of an iteration whose eye vertices draw from the first `kept` of them, which are left in `store`.
+    pub(in crate::integrators) fn light_pass(
+        &self,
+        iteration: &Iteration,
+        kept: u32,
+        store: &mut LightStore,
+    ) -> Vec<Piece> {
+        let scene = iteration.scene;
+        let splat = match self.weigher.techniques.uses_light_image() {
+            true => scene.film_size[0] * scene.film_size[1],
+            false => 0,
+        };
+        let all = splat.max(kept);
+        let one_piece = |worker: &mut Worker, chunk: u32| {
+            let (mut tracer, mut store) = (Tracer::new(&*scene.query), LightStore::default());
+            let first = chunk * LIGHT_PATHS_AT_ONCE;
+            for path in first..all.min(first + LIGHT_PATHS_AT_ONCE) {
+                let keep = path < kept;
+                if path < splat {
+                    self.light_path(iteration, path, worker, &mut tracer, None, keep);
+                } else {
+                    let mut sampler = self.light_sampler(iteration, path);
+                    light_path::trace(self, scene, &mut sampler, &mut tracer, &mut worker.light, None, None, keep);
+                }
+                if keep {
+                    store.keep(path, &worker.light);
+                }
+            }
+            (worker.finish(self, tracer), store)
+        };
+        let pieces: Vec<(Piece, LightStore)> =
+            (0..all.div_ceil(LIGHT_PATHS_AT_ONCE)).into_par_iter().map_init(Worker::new, one_piece).collect();
+        store.clear();
+        pieces
+            .into_iter()
+            .map(|(piece, part)| {
+                store.append(part);
+                piece
+            })
+            .collect()
+    }
+
     fn render_tile(
         &self,
         iteration: &Iteration,
@@ -284,8 +333,8 @@ impl Bidirectional {
         let techniques = &self.weigher.techniques;
         for pixel in 0..tile.pixels() {
             let (x, y) = tile.pixel(pixel);
-            if self.uses_light_paths() {
-                self.light_path(iteration, y * scene.film_size[0] + x, worker, &mut tracer, None);
+            if !self.resamples() && self.uses_light_paths() {
+                self.light_path(iteration, y * scene.film_size[0] + x, worker, &mut tracer, None, self.connects);
             }
             if techniques.uses_eye_paths() {
                 self.eye_path(iteration, (x, y), worker, &mut tracer, &mut found, None);
@@ -305,7 +354,7 @@ impl Bidirectional {
         for path in paths {
             let (x, y) = (path % scene.film_size[0], path / scene.film_size[0]);
             if x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height {
-                self.light_path(iteration, path, worker, &mut tracer, None);
+                self.light_path(iteration, path, worker, &mut tracer, None, false);
             }
         }
         worker.finish(self, tracer)
@@ -348,11 +397,15 @@ impl Integrator for Bidirectional {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
         let scene = iteration.scene;
         self.weigher.techniques.set_light_paths(self.light_paths(scene));
-        let prepared = self.prepare_resampling(iteration);
+        let mut harvest = Harvest::default();
+        if self.resamples() {
+            let (stats, pieces) = self.prepare_resampling(iteration);
+            harvest.stats = stats;
+            harvest.add(pieces);
+        }
         let mut samples = std::mem::take(&mut self.samples);
         samples.resize_with(film.tiles.len(), SampleBuffer::default);
         let this = &*self;
-        let mut harvest = Harvest { stats: prepared, ..Harvest::default() };
         let tiles = film
             .tiles
             .par_iter()
@@ -363,7 +416,7 @@ impl Integrator for Bidirectional {
         harvest.add(phases.time("sub-paths and connections", || tiles.collect()));
 
         let light_image = this.weigher.techniques.uses_light_image().then(|| {
-            if scene.features.contains(Features::CROP) {
+            if !this.resamples() && scene.features.contains(Features::CROP) {
                 let all = scene.film_size[0] * scene.film_size[1];
                 let outside =
                     (0..all.div_ceil(LIGHT_PATHS_AT_ONCE)).into_par_iter().map_init(Worker::new, |worker, chunk| {
@@ -382,7 +435,9 @@ impl Integrator for Bidirectional {
         harvest.stats.phases.merge(&phases);
         film.iterations += 1;
         self.samples = samples;
-        self.learn();
+        if self.resamples() {
+            self.learn();
+        }
         if let Some(pyramid) = &mut self.pyramid {
             for f in harvest.found.iter().flatten() {
                 pyramid.add((f.s.into(), f.t.into()), (f.x, f.y), f.raw, f.weight);
@@ -418,7 +473,7 @@ impl Integrator for Bidirectional {
         let mut seen = vec![];
         if self.uses_light_paths() {
             let path = y * scene.film_size[0] + x;
-            self.light_path(iteration, path, &mut worker, &mut tracer, Some(&mut replay));
+            self.light_path(iteration, path, &mut worker, &mut tracer, Some(&mut replay), self.connects);
             // One sub-path may fill a packet and more: what has been answered already is among the splats.
             seen.extend(worker.splats.drain(..).map(|s| s.note));
             worker.lens.flush(&mut tracer, |f| seen.push(f.note));

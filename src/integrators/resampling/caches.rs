@@ -1,36 +1,50 @@
 //! Cache points: places on surfaces where the question "which light sub-path matters here?" is answered for their surroundings.
 //!
-//! They are the vertices of a few eye sub-paths (a fixed share of the number of pixels), traced once. For every iteration each gets
-//! a probability mass function over the light vertices of the iteration, proportional to what they bring to it, visibility
-//! included; and each keeps a running mean of the sum of that, its irradiance Q.
+//! They are the vertices of a few eye sub-paths (a fixed share of the number of pixels), traced once. Those that are near each other
+//! and face the same way form groups of up to sixteen, which share packets of shadow rays and, where there are two stages, the
+//! candidates of the second. Each keeps running means of what there is to find at it: its normalisations Q.
 
-use super::store::LightStore;
 use crate::math::sampler::PathSampler;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
+use crate::mis::Targets;
 use crate::path::{Edge, Limits, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
-use crate::ray::offset::{SegmentEnd, segment};
-use crate::ray::{PACKET, Ray, RayKind, RayStats, SegmentPacket, Tracer};
+use crate::ray::offset::SegmentEnd;
+use crate::ray::{PACKET, Ray, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
-use crate::spatial::{NearestPoints, morton};
+use crate::spatial::NearestPoints;
+use crate::spatial::nearest::facing;
+use crate::spatial::point_tree::Viewpoint;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The random stream of the eye sub-paths that make cache points.
 const CACHE_STREAM: u64 = 4;
+
+/// A cache point.
+#[derive(Clone, Copy, Debug)]
+struct Cache {
+    p: Vec3,
+    /// Unit normal on the side that the eye sub-path saw.
+    side: Vec3,
+    error: f32,
+    ng: Vec3,
+}
 
 /// A fixed set of cache points with their estimates.
 #[derive(Debug)]
 pub(in crate::integrators) struct Caches {
     pub index: NearestPoints,
-    errors: Vec<f32>,
-    geometric: Vec<Vec3>,
-    /// Sum over iterations of each point's irradiance, and their number.
-    sums: Vec<f64>,
+    ends: Vec<SegmentEnd>,
+    /// Ranges of points.
+    pub groups: Vec<Range<usize>>,
+    /// Sum over iterations of what each point found of the two targets (scattered first), and their number.
+    sums: Vec<[f64; 2]>,
     iterations: u64,
 }
 
 /// Collects the connectable vertices of a walk.
-struct Collect(Vec<(Vec3, Vec3, f32, Vec3)>);
+struct Collect(Vec<Cache>);
 
 impl WalkHooks for Collect {
     fn surface(&mut self, v: &SurfaceVertex, _tracer: &mut Tracer, _sampler: &mut PathSampler) -> bool {
@@ -40,7 +54,7 @@ impl WalkHooks for Collect {
         if v.bsdf.connectable() {
             let ng = v.point.ng;
             let side = if ng.dot(v.wo) < 0.0 { -ng } else { ng };
-            self.0.push((v.point.p, side, v.point.error, ng));
+            self.0.push(Cache { p: v.point.p, side, error: v.point.error, ng });
         }
         true
     }
@@ -48,179 +62,166 @@ impl WalkHooks for Collect {
     fn escaped(&mut self, _index: u32, _direction: Vec3, _throughput: Rgb, _edge: &Edge) {}
 }
 
-/// Every cache point's probabilities of an iteration's light vertices.
-#[derive(Debug, Default)]
-pub(in crate::integrators) struct Pmfs {
-    /// Light vertices.
-    pub vertices: usize,
-    /// For each cache point and vertex, the sum of what the vertices up to it bring, over the whole: cumulative probabilities. All
-    /// zero where nothing is brought.
-    cdf: Vec<f32>,
-}
-
-impl Pmfs {
-    /// Cumulative probabilities of one cache point; `None` if no light vertex brings it anything.
-    #[inline]
-    pub fn of(&self, cache: usize) -> Option<&[f32]> {
-        let cdf = &self.cdf[cache * self.vertices..(cache + 1) * self.vertices];
-        cdf.last().is_some_and(|&top| top > 0.0).then_some(cdf)
+/// Cuts a range of points in two along the longest side of the box around them, at a multiple of the size of a packet, until it fits
+/// into one.
+fn group(points: &mut [Cache], first: usize, groups: &mut Vec<Range<usize>>) {
+    if points.len() <= PACKET {
+        groups.push(first..first + points.len());
+        return;
     }
+    let lo = points.iter().fold(Vec3::INFINITY, |lo, c| lo.min(c.p));
+    let hi = points.iter().fold(Vec3::NEG_INFINITY, |hi, c| hi.max(c.p));
+    let size = hi - lo;
+    let axis = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let middle = points.len().div_ceil(2).next_multiple_of(PACKET).min(points.len() - 1);
+    points.select_nth_unstable_by(middle, |a, b| a.p[axis].total_cmp(&b.p[axis]));
+    let (left, right) = points.split_at_mut(middle);
+    group(left, first, groups);
+    group(right, first + middle, groups);
 }
 
 impl Caches {
-    /// The vertices of `fraction` times as many eye sub-paths as the full picture has pixels.
-    pub fn new(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits) -> (Caches, RayStats) {
-        let [width, height] = scene.film_size.map(f64::from);
-        let scale = fraction.sqrt();
-        let [columns, rows] = [width, height].map(|s| ((s * scale).round() as u64).max(1));
-        let pieces: Vec<(Collect, RayStats)> = (0..columns * rows)
-            .into_par_iter()
-            .map(|i| {
-                let mut sampler = PathSampler::new(seed, CACHE_STREAM, i, 0);
-                let u = sampler.origin();
-                let at = [(i % columns) as f32 + u[0], (i / columns) as f32 + u[1]];
-                let raster = [at[0] / columns as f32 * width as f32, at[1] / rows as f32 * height as f32];
-                let eye = scene.camera.sample_ray(raster, [u[2], u[3]]);
-                let start = WalkStart {
-                    ray: Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far },
-                    throughput: Rgb::WHITE,
-                    pdf: SolidAnglePdf(1.0),
-                    delta: false,
-                    kind: RayKind::Cache,
-                };
-                let (mut collect, mut tracer) = (Collect(vec![]), Tracer::new(&*scene.query));
-                walk(scene, start, limits, Transport::Radiance, &mut tracer, &mut sampler, &mut collect);
-                (collect, tracer.stats)
-            })
-            .collect();
-        let mut stats = RayStats::default();
-        let mut all = vec![];
-        for (collect, s) in pieces {
-            stats.merge(&s);
-            all.extend(collect.0);
+    /// The vertices of `fraction` times as many eye sub-paths as the full picture has pixels. With `by_group`, all neighbours of a
+    /// place are of one group.
+    pub fn new(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits, by_group: bool) -> (Caches, RayStats) {
+        let (mut all, stats) = place(scene, seed, fraction, limits);
+        // Stable sorts and selections on equal input: the same for any number of threads.
+        all.sort_by_key(|c| facing(c.side));
+        let mut groups = vec![];
+        let mut first = 0;
+        while first < all.len() {
+            let own = facing(all[first].side);
+            let count = all[first..].iter().take_while(|c| facing(c.side) == own).count();
+            group(&mut all[first..first + count], first, &mut groups);
+            first += count;
         }
-        // Neighbours in the list are neighbours in space: they share packets.
-        let positions: Vec<Vec3> = all.iter().map(|c| c.0).collect();
-        let all: Vec<_> = morton::order(&positions).into_iter().map(|i| all[i as usize]).collect();
-        let index = NearestPoints::new(all.iter().map(|c| c.0).collect(), all.iter().map(|c| c.1).collect());
-        let caches = Caches {
-            index,
-            errors: all.iter().map(|c| c.2).collect(),
-            geometric: all.iter().map(|c| c.3).collect(),
-            sums: vec![0.0; all.len()],
-            iterations: 0,
+        let (points, sides) = (all.iter().map(|c| c.p).collect(), all.iter().map(|c| c.side).collect());
+        let index = match by_group {
+            true => NearestPoints::new(points, sides).within_groups(&groups),
+            false => NearestPoints::new(points, sides),
         };
-        (caches, stats)
+        let ends = all.iter().map(|c| SegmentEnd::Surface { p: c.p, error: c.error, ng: c.ng }).collect();
+        (Caches { index, ends, groups, sums: vec![[0.0; 2]; all.len()], iterations: 0 }, stats)
     }
 
-    /// Mean of the irradiance that iterations so far found at the cache points around `p` whose side is `n`.
+    /// A cache point's end of a shadow ray.
     #[inline]
-    pub fn irradiance(&self, p: Vec3, n: Vec3) -> f32 {
-        if self.iterations == 0 {
-            return 0.0;
-        }
-        let (mut sum, mut count) = (0.0, 0.0);
+    pub fn end(&self, cache: usize) -> &SegmentEnd {
+        &self.ends[cache]
+    }
+
+    /// The ball around a group of cache points.
+    pub fn viewpoint(&self, group: &Range<usize>) -> Viewpoint {
+        let (points, sides) = (&self.index.points()[group.clone()], &self.index.normals()[group.clone()]);
+        let count = group.len().max(1) as f32;
+        let centre = points.iter().sum::<Vec3>() / count;
+        let radius = (points.iter().map(|p| p.distance_squared(centre)).sum::<f32>() / count).sqrt();
+        // Sides that differ much have no horizon in common.
+        let mean = sides.iter().sum::<Vec3>() / count;
+        let normal = if mean.length_squared() > 0.98 { mean.normalize() } else { Vec3::ZERO };
+        Viewpoint { centre, radius, normal }
+    }
+
+    /// Means over iterations so far of what the cache points around `p` whose side is `n` found.
+    #[inline]
+    pub fn there(&self, p: Vec3, n: Vec3) -> Targets {
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
         for i in self.index.find(p, n) {
-            sum += self.sums[i];
+            let own = self.sums[i];
+            sum = [sum[0] + own[0], sum[1] + own[1]];
             count += self.iterations as f64;
         }
-        if count > 0.0 { (sum / count) as f32 } else { 0.0 }
+        if count <= 0.0 {
+            return Targets::default();
+        }
+        Targets { scattered: (sum[0] / count) as f32, unscattered: (sum[1] / count) as f32 }
     }
 
-    /// Probabilities of the vertices of `store`, by shadow rays from every cache point to every vertex. The irradiances that come with
-    /// them are returned, and not yet part of the mean.
-    pub fn pmfs(&self, scene: &PreparedScene, store: &LightStore) -> (Pmfs, Vec<f64>, RayStats) {
-        let vertices = store.vertices.len();
-        let mut cdf = vec![0.0f32; self.index.len() * vertices];
-        let mut totals = vec![0.0f64; self.index.len()];
-        if vertices == 0 {
-            return (Pmfs { vertices, cdf }, totals, RayStats::default());
-        }
-        let stats = cdf
-            .par_chunks_mut(PACKET * vertices)
-            .zip(totals.par_chunks_mut(PACKET))
-            .enumerate()
-            .map(|(tile, (cdf, totals))| self.tile(scene, store, tile * PACKET, cdf, totals))
-            .reduce(RayStats::default, |mut a, b| {
-                a.merge(&b);
-                a
-            });
-        (Pmfs { vertices, cdf }, totals, stats)
-    }
-
-    /// Up to sixteen neighbouring cache points from number `first` on.
-    fn tile(
-        &self,
-        scene: &PreparedScene,
-        store: &LightStore,
-        first: usize,
-        cdf: &mut [f32],
-        totals: &mut [f64],
-    ) -> RayStats {
-        let mut tracer = Tracer::new(&*scene.query);
-        let vertices = store.vertices.len();
-        let (points, sides) = (&self.index.points()[first..], &self.index.normals()[first..]);
-        for (v, y) in store.vertices.iter().enumerate() {
-            let y = &y.vertex;
-            let mut packet = SegmentPacket::default();
-            let mut asked = [(0usize, 0.0f32); PACKET];
-            for c in 0..totals.len() {
-                let brings = y.brings(points[c], sides[c]);
-                if brings > 0.0 && brings.is_finite() {
-                    asked[packet.len] = (c, brings);
-                    packet.push(&segment(
-                        &SegmentEnd::Surface {
-                            p: points[c],
-                            error: self.errors[first + c],
-                            ng: self.geometric[first + c],
-                        },
-                        &SegmentEnd::Surface { p: y.point.p, error: y.point.error, ng: y.point.ng },
-                    ));
-                }
-            }
-            if packet.len == 0 {
-                continue;
-            }
-            let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
-            for (i, &(c, brings)) in asked[..packet.len].iter().enumerate() {
-                if blocked >> i & 1 == 0 {
-                    cdf[c * vertices + v] = brings;
-                }
-            }
-        }
-        for (cdf, total) in cdf.chunks_exact_mut(vertices).zip(totals) {
-            let mut sum = 0.0f64;
-            for c in cdf.iter_mut() {
-                sum += f64::from(*c);
-                *c = sum as f32;
-            }
-            if sum > 0.0 {
-                cdf.iter_mut().for_each(|c| *c = (f64::from(*c) / sum) as f32);
-            }
-            *total = sum / store.paths_traced as f64;
-        }
-        tracer.stats
-    }
-
-    /// Adds an iteration's irradiances to the means.
-    pub fn learn(&mut self, irradiances: &[f64]) {
-        for (sum, q) in self.sums.iter_mut().zip(irradiances) {
-            *sum += q;
+    /// Adds what an iteration found to the means.
+    pub fn learn<'a>(&mut self, found: impl Iterator<Item = &'a [f64; 2]>) {
+        for (sum, own) in self.sums.iter_mut().zip(found) {
+            *sum = [sum[0] + own[0], sum[1] + own[1]];
         }
         self.iterations += 1;
     }
 
     /// What must be saved to go on later: the sums, and the number of iterations behind them.
-    pub fn state(&self) -> (&[f64], u64) {
+    pub fn state(&self) -> (&[[f64; 2]], u64) {
         (&self.sums, self.iterations)
     }
 
     /// Goes on from a saved state; false if it is of other cache points.
-    pub fn restore(&mut self, sums: Vec<f64>, iterations: u64) -> bool {
+    pub fn restore(&mut self, sums: Vec<[f64; 2]>, iterations: u64) -> bool {
         let fits = sums.len() == self.sums.len();
         if fits {
             (self.sums, self.iterations) = (sums, iterations);
         }
         fits
+    }
+}
+
+fn place(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits) -> (Vec<Cache>, RayStats) {
+    let [width, height] = scene.film_size.map(f64::from);
+    let scale = fraction.sqrt();
+    let [columns, rows] = [width, height].map(|s| ((s * scale).round() as u64).max(1));
+    let pieces: Vec<(Collect, RayStats)> = (0..columns * rows)
+        .into_par_iter()
+        .map(|i| {
+            let mut sampler = PathSampler::new(seed, CACHE_STREAM, i, 0);
+            let u = sampler.origin();
+            let at = [(i % columns) as f32 + u[0], (i / columns) as f32 + u[1]];
+            let raster = [at[0] / columns as f32 * width as f32, at[1] / rows as f32 * height as f32];
+            let eye = scene.camera.sample_ray(raster, [u[2], u[3]]);
+            let start = WalkStart {
+                ray: Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far },
+                throughput: Rgb::WHITE,
+                pdf: SolidAnglePdf(1.0),
+                delta: false,
+                kind: RayKind::Cache,
+            };
+            let (mut collect, mut tracer) = (Collect(vec![]), Tracer::new(&*scene.query));
+            walk(scene, start, limits, Transport::Radiance, &mut tracer, &mut sampler, &mut collect);
+            (collect, tracer.stats)
+        })
+        .collect();
+    let mut stats = RayStats::default();
+    let mut all = vec![];
+    for (collect, s) in pieces {
+        stats.merge(&s);
+        all.extend(collect.0);
+    }
+    (all, stats)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashRng;
+
+    #[test]
+    fn groups_are_full_and_near() {
+        let mut rng = HashRng::new(5, 6, 7, 8);
+        let mut points: Vec<Cache> = (0..1000)
+            .map(|_| {
+                let [x, y, z, _] = rng.next_4();
+                Cache { p: Vec3::new(x, y, z), side: Vec3::Z, error: 0.0, ng: Vec3::Z }
+            })
+            .collect();
+        let mut groups = vec![];
+        group(&mut points, 0, &mut groups);
+        assert!(groups.iter().map(ExactSizeIterator::len).eq(std::iter::repeat_n(16, 62).chain([8])));
+        assert!(groups.windows(2).all(|w| w[0].end == w[1].start) && groups[0].start == 0);
+        for g in &groups {
+            let centre = points[g.clone()].iter().map(|c| c.p).sum::<Vec3>() / g.len() as f32;
+            assert!(points[g.clone()].iter().all(|c| c.p.distance(centre) < 0.4));
+        }
+        group(&mut [], 3, &mut groups);
+        assert_eq!(groups.pop(), Some(3..3));
     }
 }

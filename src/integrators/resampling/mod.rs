@@ -12,25 +12,39 @@
 //!
 //! P is positive wherever f is, and p(ȳ)⁻¹ = β_L / f_y, so any weights that sum to one per path make this unbiased. `pcbpt` takes the
 //! weights of bidirectional path tracing; `ris` those that know how resampling changes the density (`mis::resampled`). These ask for
-//! the irradiance Q, whose estimate comes from earlier iterations only, the first of them untallied.
+//! the normalisation Q, whose estimate comes from earlier iterations only, the first of them untallied.
+//!
+//! `two-stage` asks at cache points for a few vertices only, M₂ of all those of M sub-paths, drawn before by what they would bring if
+//! all were in sight (`pmfs.rs`). Groups of neighbouring cache points share what they draw, so that the mixture above is one over the
+//! same M₂ vertices; P is then P₁ P₂ (Nabata et al. 2020, "Two-stage resampling").
+//!
+//! Candidates are the first M of an iteration's light sub-paths, whose splats the light image takes in any case.
 
 pub(in crate::integrators) mod caches;
+mod pmfs;
+mod prepare;
+pub(in crate::integrators) mod resampler;
 pub(in crate::integrators) mod store;
 
-use super::bdpt::eye_path::Candidate;
 use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH, TECHNIQUES};
-use super::{IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params};
-use crate::math::Vec3;
-use crate::mis::{Heuristic, Resampled, Weigher};
-use crate::ray::{Phases, RayStats};
-use crate::shade::SurfacePoint;
-use caches::{Caches, Pmfs};
-use store::LightStore;
+use super::{IntegratorSpec, ParamDefault, ParamSpec, Params};
+use crate::mis::Heuristic;
+pub(in crate::integrators) use resampler::Resampler;
 
 const PATHS: ParamSpec = ParamSpec {
     name: "paths",
     about: "M, light sub-paths per iteration from which eye vertices draw",
     default: ParamDefault::Int(200, 1, 10_000_000),
+};
+const FIRST_STAGE: ParamSpec = ParamSpec {
+    name: "paths",
+    about: "M1, light sub-paths per iteration for the first stage; 0: 10000, or the number of pixels if that is less",
+    default: ParamDefault::Int(0, 0, 10_000_000),
+};
+const SECOND_STAGE: ParamSpec = ParamSpec {
+    name: "second_stage",
+    about: "M2, light vertices that the first stage leaves to a group of cache points",
+    default: ParamDefault::Int(200, 1, 1_000_000),
 };
 const SAMPLES: ParamSpec =
     ParamSpec { name: "samples", about: "N, draws of each eye vertex", default: ParamDefault::Int(1, 1, 1024) };
@@ -49,45 +63,57 @@ const EPSILON: ParamSpec = ParamSpec {
     about: "smallest ratio of densities p/q that weights use, in millionths",
     default: ParamDefault::Int(1000, 1, 1_000_000),
 };
-const fn weights(default: &'static str) -> ParamSpec {
+const fn weights(default: &'static str, choices: &'static [&'static str]) -> ParamSpec {
     ParamSpec {
         name: "weights",
-        about: "balance: as if connections were not resampled; ris: with the density that resampling makes",
-        default: ParamDefault::Choice(default, &["balance", "ris"]),
+        about: "what weights know: balance: nothing of resampling; ris: that one of many is drawn; two-stage: that it is drawn in two stages",
+        default: ParamDefault::Choice(default, choices),
     }
 }
 
-/// The parameters of all resampled methods; they differ in the weights they take by default.
-const fn parameters(default_weights: &'static str) -> [ParamSpec; 10] {
-    [
-        MAX_DEPTH,
-        RR_DEPTH,
-        HIDE_EMITTERS,
-        TECHNIQUES,
-        PATHS,
-        SAMPLES,
-        NEIGHBOURS,
-        CACHES,
-        EPSILON,
-        weights(default_weights),
-    ]
+/// The parameters of methods with one stage; they differ in the weights they take by default.
+const fn one_stage(default_weights: &'static str) -> [ParamSpec; 10] {
+    let weights = weights(default_weights, &["balance", "ris"]);
+    [MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, NEIGHBOURS, CACHES, EPSILON, weights]
 }
 
-const PCBPT_PARAMS: [ParamSpec; 10] = parameters("balance");
-const RIS_PARAMS: [ParamSpec; 10] = parameters("ris");
+const PCBPT_PARAMS: [ParamSpec; 10] = one_stage("balance");
+const RIS_PARAMS: [ParamSpec; 10] = one_stage("ris");
+const TWO_STAGE_PARAMS: [ParamSpec; 11] = [
+    MAX_DEPTH,
+    RR_DEPTH,
+    HIDE_EMITTERS,
+    TECHNIQUES,
+    FIRST_STAGE,
+    SECOND_STAGE,
+    SAMPLES,
+    NEIGHBOURS,
+    CACHES,
+    EPSILON,
+    weights("two-stage", &["balance", "ris", "two-stage"]),
+];
 
-fn build(params: &Params) -> Box<dyn super::Integrator> {
+fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Integrator> {
     let settings = Settings {
         paths: params.int("paths") as u32,
+        second_stage,
         samples: params.int("samples") as u32,
         neighbours: params.int("neighbours") as usize,
         cache_fraction: params.int("caches") as f64 * 1e-5,
         epsilon: params.int("epsilon") as f32 * 1e-6,
-        aware: params.choice("weights") == "ris",
+        weights: match params.choice("weights") {
+            "balance" => Weights::Balance,
+            "ris" => Weights::OneStage,
+            _ => Weights::TwoStage,
+        },
     };
     let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
     this.resample(settings);
     Box::new(this)
+}
+
+fn build(params: &Params) -> Box<dyn super::Integrator> {
+    build_with(params, None)
 }
 
 /// The registry's line of `pcbpt`.
@@ -114,235 +140,44 @@ pub static RIS: IntegratorSpec = IntegratorSpec {
     build,
 };
 
+/// The registry's line of `two-stage`.
+pub static TWO_STAGE: IntegratorSpec = IntegratorSpec {
+    name: "two-stage",
+    aliases: &["tsr"],
+    about: "Two-stage resampled connections: as ris, from very many light sub-paths, of which cache points ask for few",
+    params: &TWO_STAGE_PARAMS,
+    unbiased: true,
+    refuses: |_| None,
+    cannot: |_| None,
+    build: |params| build_with(params, Some(params.int("second_stage") as u32)),
+};
+
+/// What weights know of resampling.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::integrators) enum Weights {
+    /// Nothing.
+    Balance,
+    /// That one of M sub-paths is drawn (of two stages: one of M₂).
+    OneStage,
+    /// That it is drawn in two stages.
+    TwoStage,
+}
+
 /// What a user decides.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::integrators) struct Settings {
-    /// M.
+    /// M; 0: decided by the size of the picture.
     pub paths: u32,
+    /// M₂, if there are two stages.
+    pub second_stage: Option<u32>,
     /// N.
     pub samples: u32,
     /// Cache points that an eye vertex mixes.
     pub neighbours: usize,
     /// Eye sub-paths that make cache points, per pixel.
     pub cache_fraction: f64,
-    /// See [`Resampled::epsilon`].
+    /// See [`Resampled::epsilon`](crate::mis::Resampled).
     pub epsilon: f32,
-    /// Weights know of the resampling.
-    pub aware: bool,
-}
-
-/// Sets of light sub-paths that estimate irradiances before the first iteration.
-const WARM_UP: u64 = 4;
-
-/// The candidates of an iteration and how to draw from them.
-#[derive(Debug)]
-pub(in crate::integrators) struct Resampler {
-    pub settings: Settings,
-    caches: Option<Caches>,
-    store: LightStore,
-    pmfs: Pmfs,
-    /// Irradiances of this iteration, to be learnt at its end.
-    pending: Vec<f64>,
-    /// Sum over sets of the number of vertices, and of sub-paths.
-    seen: [u64; 2],
-    /// Seed and iteration that replays are prepared for.
-    ready: Option<(u64, u64)>,
-}
-
-/// The side of a point's surface on which the direction `d` leaves it.
-#[inline]
-fn side(point: &SurfacePoint, d: Vec3) -> Vec3 {
-    if point.ng.dot(d) < 0.0 { -point.ng } else { point.ng }
-}
-
-impl Resampler {
-    pub fn new(settings: Settings) -> Resampler {
-        Resampler {
-            settings,
-            caches: None,
-            store: LightStore::default(),
-            pmfs: Pmfs::default(),
-            pending: vec![],
-            seen: [0; 2],
-            ready: None,
-        }
-    }
-
-    /// Q at a point, on the side of the direction `d`.
-    #[inline]
-    pub fn irradiance(&self, point: &SurfacePoint, d: Vec3) -> f32 {
-        if !self.settings.aware {
-            return 0.0;
-        }
-        self.caches.as_ref().map_or(0.0, |caches| caches.irradiance(point.p, side(point, d)))
-    }
-
-    /// c of a sub-path that brings `brings` to a point from the direction `from`.
-    #[inline]
-    pub fn factor(&self, weigher: &Weigher, brings: f32, point: &SurfacePoint, from: Vec3) -> f32 {
-        match &weigher.resampled {
-            None => 1.0,
-            Some(resampled) => resampled.factor(brings, self.irradiance(point, from)),
-        }
-    }
-
     /// What weights know.
-    fn resampled(&self) -> Option<Resampled> {
-        let [vertices, paths] = self.seen;
-        self.settings.aware.then(|| Resampled {
-            paths: self.settings.paths as f32,
-            epsilon: self.settings.epsilon,
-            uniform: 1.0 / (self.settings.neighbours + 1) as f32,
-            vertices_per_path: if paths > 0 { (vertices as f64 / paths as f64) as f32 } else { 0.0 },
-        })
-    }
-
-    /// Draws a candidate for an eye vertex at `point` that looks from the side of `wo`; `None` if there are none.
-    #[inline]
-    pub fn draw(&self, point: &SurfacePoint, wo: Vec3, u: [f32; 2]) -> Option<Candidate<'_>> {
-        let vertices = self.pmfs.vertices;
-        if vertices == 0 {
-            return None;
-        }
-        let uniform = 1.0 / vertices as f32;
-        let mut mixed: [Option<&[f32]>; 3] = [None; 3];
-        let mut n = 0;
-        if let Some(caches) = &self.caches {
-            for i in caches.index.find(point.p, side(point, wo)).take(self.settings.neighbours) {
-                mixed[n] = self.pmfs.of(i);
-                n += 1;
-            }
-        }
-        let share = 1.0 / (n + 1) as f32;
-        let chosen = ((u[0] * (n + 1) as f32) as usize).min(n);
-        let v = match mixed.get(chosen) {
-            Some(Some(cdf)) if chosen < n => cdf.partition_point(|&c| c <= u[1]),
-            // A cache point that no light vertex reaches draws uniformly, as the last share does.
-            _ => (u[1] * vertices as f32) as usize,
-        }
-        .min(vertices - 1);
-        let mut p = share * uniform;
-        for cdf in &mixed[..n] {
-            p += share
-                * match cdf {
-                    Some(cdf) => cdf[v] - if v == 0 { 0.0 } else { cdf[v - 1] },
-                    None => uniform,
-                };
-        }
-        let scale = 1.0 / (p * self.settings.paths as f32 * self.settings.samples as f32);
-        Some(self.store.candidate(v, scale))
-    }
-
-    /// What must be saved to go on later, as bytes.
-    pub fn state(&self) -> Vec<u8> {
-        let Some(caches) = &self.caches else { return vec![] };
-        let (sums, iterations) = caches.state();
-        let mut words = vec![iterations, self.seen[0], self.seen[1]];
-        words.extend(sums.iter().map(|s| s.to_bits()));
-        words.into_iter().flat_map(u64::to_le_bytes).collect()
-    }
-}
-
-impl Bidirectional {
-    /// Connections are resampled from now on.
-    pub(in crate::integrators) fn resample(&mut self, settings: Settings) {
-        self.weigher.techniques.set_connections(settings.samples as f32);
-        self.connects &= settings.samples == 0;
-        self.resampler = Some(Resampler::new(settings));
-    }
-
-    /// Cache points and first irradiances, once; they are functions of scene and seed alone.
-    fn prepare_caches(&mut self, iteration: &Iteration, stats: &mut RayStats) {
-        let scene = iteration.scene;
-        let Some(resampler) = &mut self.resampler else { return };
-        let (mut caches, s) = Caches::new(scene, iteration.seed, resampler.settings.cache_fraction, &self.limits);
-        stats.merge(&s);
-        let paths = resampler.settings.paths;
-        let first = Iteration { index: 0, ..*iteration };
-        for set in 1..=WARM_UP {
-            let (store, s) = LightStore::trace(self, &first, paths, set);
-            stats.merge(&s);
-            let (_, irradiances, s) = caches.pmfs(scene, &store);
-            stats.merge(&s);
-            caches.learn(&irradiances);
-            if let Some(resampler) = &mut self.resampler {
-                resampler.seen[0] += store.vertices.len() as u64;
-                resampler.seen[1] += u64::from(paths);
-            }
-        }
-        if let Some(resampler) = &mut self.resampler {
-            resampler.caches = Some(caches);
-        }
-    }
-
-    /// Gets the candidates of an iteration ready.
-    pub(in crate::integrators) fn prepare_resampling(&mut self, iteration: &Iteration) -> RayStats {
-        let (mut stats, mut phases) = (RayStats::default(), Phases::default());
-        if self.resampler.as_ref().is_none_or(|_| !self.weigher.techniques.uses_connections()) {
-            return stats;
-        }
-        if self.resampler.as_ref().is_some_and(|r| r.caches.is_none()) {
-            phases.time("placing caches", || self.prepare_caches(iteration, &mut stats));
-        }
-        let Some(resampler) = &self.resampler else { return stats };
-        self.weigher.resampled = resampler.resampled();
-        let paths = resampler.settings.paths;
-        let (store, s) = phases.time("light paths", || LightStore::trace(self, iteration, paths, 0));
-        stats.merge(&s);
-        let Some(resampler) = &mut self.resampler else { return stats };
-        if let Some(caches) = &resampler.caches {
-            let (pmfs, irradiances, s) = phases.time("pmfs", || caches.pmfs(iteration.scene, &store));
-            stats.merge(&s);
-            (resampler.pmfs, resampler.pending) = (pmfs, irradiances);
-        }
-        resampler.store = store;
-        stats.phases.merge(&phases);
-        stats
-    }
-
-    /// Gets the candidates of an iteration ready as they were when it was rendered; once for any number of pixels.
-    pub(in crate::integrators) fn prepare_replay(&mut self, iteration: &Iteration) {
-        let Some(resampler) = &mut self.resampler else { return };
-        let wanted = (iteration.seed, iteration.index);
-        if resampler.ready == Some(wanted) {
-            return;
-        }
-        *resampler = Resampler::new(resampler.settings);
-        // What an iteration knows comes from those before it.
-        for index in 0..iteration.index {
-            self.prepare_resampling(&Iteration { index, ..*iteration });
-            self.learn();
-        }
-        self.prepare_resampling(iteration);
-        if let Some(resampler) = &mut self.resampler {
-            resampler.ready = Some(wanted);
-        }
-    }
-
-    /// The iteration is over: its irradiances may now be known.
-    pub(in crate::integrators) fn learn(&mut self) {
-        if let Some(resampler) = &mut self.resampler
-            && let Some(caches) = &mut resampler.caches
-        {
-            caches.learn(&resampler.pending);
-            resampler.seen[0] += resampler.store.vertices.len() as u64;
-            resampler.seen[1] += u64::from(resampler.store.paths_traced);
-        }
-    }
-
-    /// Goes on from a saved state.
-    pub(in crate::integrators) fn restore_resampling(&mut self, iteration: &Iteration, bytes: &[u8]) -> bool {
-        let mut words = bytes.chunks_exact(8).map(|c| u64::from_le_bytes(c.try_into().unwrap_or_default()));
-        let (Some(iterations), Some(vertices), Some(paths)) = (words.next(), words.next(), words.next()) else {
-            return bytes.is_empty();
-        };
-        self.prepare_caches(iteration, &mut RayStats::default());
-        match &mut self.resampler {
-            Some(resampler) => {
-                resampler.seen = [vertices, paths];
-                resampler.caches.as_mut().is_some_and(|c| c.restore(words.map(f64::from_bits).collect(), iterations))
-            }
-            None => false,
-        }
-    }
+    pub weights: Weights,
 }

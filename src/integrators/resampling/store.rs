@@ -2,36 +2,22 @@
 
 use crate::integrators::Iteration;
 use crate::integrators::bdpt::Bidirectional;
+use crate::integrators::bdpt::eye_path::Candidate;
 use crate::integrators::bdpt::light_path::{self, LightPath, LightVertex};
 use crate::integrators::replay::{Replay, VertexRecord};
 use crate::math::Vec3;
 use crate::math::sampler::PathSampler;
-use crate::mis::Node;
+use crate::mis::{Node, Targets};
 use crate::path::Origin;
 use crate::ray::{RayStats, Tracer};
 use crate::shade::Transport;
-use crate::spatial::morton;
+use crate::spatial::{PointTree, morton};
 use rayon::prelude::*;
 
-/// The random stream of light sub-paths to draw from.
-const STORE_STREAM: u64 = 5;
+/// The random stream of light sub-paths that estimate normalisations before the first iteration.
+const WARM_UP_STREAM: u64 = 5;
 /// Sub-paths in a piece of work.
 const AT_ONCE: u32 = 64;
-
-/// One light sub-path of a set of an iteration.
-fn trace_one(
-    this: &Bidirectional,
-    iteration: &Iteration,
-    (set, path): (u64, u32),
-    tracer: &mut Tracer,
-    record: Option<&mut Replay>,
-) -> LightPath {
-    let mut out = LightPath::default();
-    let stream = STORE_STREAM | set << 32;
-    let mut sampler = PathSampler::new(iteration.seed, stream, iteration.index, u64::from(path));
-    light_path::trace(this, iteration.scene, &mut sampler, tracer, &mut out, None, record, true);
-    out
-}
 
 /// Light sub-paths, cut at every vertex that can be connected to.
 #[derive(Debug, Default)]
@@ -40,8 +26,11 @@ pub(in crate::integrators) struct LightStore {
     pub paths_traced: u32,
     paths: Vec<StoredPath>,
     nodes: Vec<Node>,
-    /// In an order that keeps neighbours together.
-    pub vertices: Vec<StoredVertex>,
+    vertices: Vec<StoredVertex>,
+    /// Vertices in an order that keeps neighbours together: numbers below count in this order.
+    order: Vec<u32>,
+    /// Tree over the vertices, weighed by the luminance of f_y/p.
+    pub tree: PointTree,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -55,55 +44,58 @@ struct StoredPath {
 
 /// A vertex, and the sub-path it ends.
 #[derive(Clone, Debug)]
-pub(in crate::integrators) struct StoredVertex {
-    pub vertex: LightVertex,
+struct StoredVertex {
+    vertex: LightVertex,
     path: u32,
 }
 
 impl LightVertex {
-    /// q̂/p: luminance of what the sub-path that ends here brings to a surface at `p` on the side `n`, per unit area, as if nothing were
-    /// in the way.
+    /// What the sub-path that ends here brings to a surface at `p` on the side `n`, as if nothing were in the way: q̂₂/p and q̂₁/p.
     #[inline]
-    pub fn brings(&self, p: Vec3, n: Vec3) -> f32 {
+    pub fn brings(&self, p: Vec3, n: Vec3) -> Targets {
         let to = p - self.point.p;
         let dist2 = to.length_squared();
         let towards = to * (1.0 / dist2.sqrt());
         let cos = -n.dot(towards);
         // A point on the light vertex itself has no direction to it: not a number, and not above its horizon.
         if cos.is_nan() || cos <= 0.0 {
-            return 0.0;
+            return Targets::default();
         }
         let value = self.bsdf.eval(self.wo, towards, Transport::Importance);
-        (self.throughput * value).luminance() * cos / dist2
+        let spread = cos / dist2;
+        let targets = Targets {
+            scattered: (self.throughput * value).luminance() * spread,
+            unscattered: self.throughput.luminance() * self.point.ng.dot(towards).abs() * spread,
+        };
+        if targets.scattered.is_finite() && targets.unscattered.is_finite() { targets } else { Targets::default() }
     }
 }
 
 impl LightStore {
-    /// Traces `paths` light sub-paths of the iteration; `set` tells those of the same iteration apart.
+    /// Traces `paths` light sub-paths, of which `set` tells one set from another, before the first iteration.
     pub fn trace(this: &Bidirectional, iteration: &Iteration, paths: u32, set: u64) -> (LightStore, RayStats) {
         let scene = iteration.scene;
-        let pieces: Vec<(Vec<LightPath>, RayStats)> = (0..paths.div_ceil(AT_ONCE))
+        let stream = WARM_UP_STREAM | set << 32;
+        let pieces: Vec<(LightStore, RayStats)> = (0..paths.div_ceil(AT_ONCE))
             .into_par_iter()
             .map(|piece| {
-                let mut tracer = Tracer::new(&*scene.query);
-                let trace = |path: u32| trace_one(this, iteration, (set, path), &mut tracer, None);
-                let range = piece * AT_ONCE..paths.min((piece + 1) * AT_ONCE);
-                (range.map(trace).collect(), tracer.stats)
+                let (mut tracer, mut path) = (Tracer::new(&*scene.query), LightPath::default());
+                let mut store = LightStore::default();
+                for number in piece * AT_ONCE..paths.min((piece + 1) * AT_ONCE) {
+                    let mut sampler = PathSampler::new(iteration.seed, stream, iteration.index, u64::from(number));
+                    light_path::trace(this, scene, &mut sampler, &mut tracer, &mut path, None, None, true);
+                    store.keep(number, &path);
+                }
+                (store, tracer.stats)
             })
             .collect();
-        let mut store = LightStore { paths_traced: paths, ..LightStore::default() };
+        let mut store = LightStore::default();
         let mut stats = RayStats::default();
-        for (number, path) in pieces
-            .into_iter()
-            .flat_map(|(paths, s)| {
-                stats.merge(&s);
-                paths
-            })
-            .enumerate()
-        {
-            store.add((number as u32, path));
+        for (piece, s) in pieces {
+            store.append(piece);
+            stats.merge(&s);
         }
-        store.sort();
+        store.finish();
         (store, stats)
     }
 
@@ -111,40 +103,86 @@ impl LightStore {
     pub fn retrace(this: &Bidirectional, iteration: &Iteration, number: u32) -> Vec<VertexRecord> {
         let mut replay = Replay::default();
         let mut tracer = Tracer::new(&*iteration.scene.query);
-        trace_one(this, iteration, (0, number), &mut tracer, Some(&mut replay));
+        let mut sampler = this.light_sampler(iteration, number);
+        let mut path = LightPath::default();
+        light_path::trace(this, iteration.scene, &mut sampler, &mut tracer, &mut path, None, Some(&mut replay), true);
         replay.light
     }
 
-    fn add(&mut self, (sub_path, path): (u32, LightPath)) {
-        let number = self.paths.len() as u32;
+    /// Takes in sub-path `number`.
+    pub fn keep(&mut self, number: u32, path: &LightPath) {
+        self.paths_traced += 1;
         if path.vertices.is_empty() {
             return;
         }
+        let stored = self.paths.len() as u32;
         self.paths.push(StoredPath {
-            number: sub_path,
+            number,
             first_node: self.nodes.len(),
             next_event: path.next_event,
             light_can_be_hit: path.light_can_be_hit,
             origin: path.origin,
         });
         self.nodes.extend_from_slice(path.side.nodes());
-        self.vertices.extend(path.vertices.into_iter().map(|vertex| StoredVertex { vertex, path: number }));
+        self.vertices.extend(path.vertices.iter().map(|v| StoredVertex { vertex: v.clone(), path: stored }));
     }
 
-    fn sort(&mut self) {
+    /// Takes in everything of `other`.
+    pub fn append(&mut self, mut other: LightStore) {
+        let (paths, nodes) = (self.paths.len() as u32, self.nodes.len());
+        self.paths_traced += other.paths_traced;
+        self.paths.extend(other.paths.iter().map(|path| StoredPath { first_node: path.first_node + nodes, ..*path }));
+        self.nodes.append(&mut other.nodes);
+        other.vertices.iter_mut().for_each(|v| v.path += paths);
+        self.vertices.append(&mut other.vertices);
+    }
+
+    /// Puts the vertices in order, when all are there.
+    pub fn finish(&mut self) {
         let positions: Vec<Vec3> = self.vertices.iter().map(|v| v.vertex.point.p).collect();
-        let mut vertices: Vec<Option<StoredVertex>> =
-            std::mem::take(&mut self.vertices).into_iter().map(Some).collect();
-        let order = morton::order(&positions);
-        self.vertices = order.into_iter().filter_map(|i| vertices[i as usize].take()).collect();
+        self.order = morton::order(&positions);
+        let sorted: Vec<Vec3> = self.order.iter().map(|&i| positions[i as usize]).collect();
+        let vertices = &self.vertices;
+        self.tree.build(
+            &sorted,
+            self.order.iter().map(|&i| {
+                let weight = vertices[i as usize].vertex.throughput.luminance();
+                if weight.is_finite() { weight } else { 0.0 }
+            }),
+        );
+    }
+
+    /// Forgets everything but its memory.
+    pub fn clear(&mut self) {
+        self.paths_traced = 0;
+        self.paths.clear();
+        self.nodes.clear();
+        self.vertices.clear();
+        self.order.clear();
+    }
+
+    /// Number of vertices.
+    pub fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.order.is_empty()
+    }
+
+    /// A vertex, by its place in the order.
+    #[inline]
+    pub fn vertex(&self, v: usize) -> &LightVertex {
+        &self.vertices[self.order[v] as usize].vertex
     }
 
     /// The sub-path that ends in vertex `v`, as a candidate for a connection that counts `scale` times.
     #[inline]
-    pub fn candidate(&self, v: usize, scale: f32) -> crate::integrators::bdpt::eye_path::Candidate<'_> {
-        let StoredVertex { vertex, path } = &self.vertices[v];
+    pub fn candidate(&self, v: usize, scale: f32) -> Candidate<'_> {
+        let StoredVertex { vertex, path } = &self.vertices[self.order[v] as usize];
         let path = &self.paths[*path as usize];
-        crate::integrators::bdpt::eye_path::Candidate {
+        Candidate {
             vertex,
             nodes: &self.nodes[path.first_node..path.first_node + vertex.s],
             next_event: path.next_event,

@@ -1,0 +1,231 @@
+//! Probabilities of an iteration's light vertices at cache points.
+//!
+//! A group of cache points has *entries*: the light vertices that its points choose from. With one stage these are all vertices of the
+//! iteration. With two stages the vertices are cut into M₂ clusters that look like one point from the group, and one is drawn from each:
+//! Y_j of cluster C_j with P₁ = (f_y/p)(Y_j) / S_j, S_j = Σ over C_j of f_y/p (Nabata et al. 2020, "Two-stage resampling", §5.1).
+//!
+//! Every cache point then has a probability P₂(j) of its entries, proportional to q̂₂/(p P₁): what the entry brings there, visibility
+//! included, times the number that it stands for. One drawn per cluster, the entries sum up to the whole by themselves: there is no
+//! 1/M₂, which eq. 15 there needs for M₂ independent draws.
+//!
+//! Shadow rays go out in packets, from all points of a group to one light vertex.
+
+use super::caches::Caches;
+use super::store::LightStore;
+use crate::math::hash::HashRng;
+use crate::prepared::PreparedScene;
+use crate::ray::offset::{SegmentEnd, segment};
+use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
+use crate::spatial::point_tree::CutMemory;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// The random stream of first stages.
+const FIRST_STAGE_STREAM: u64 = 6;
+
+/// A light vertex that a group of cache points chooses from.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    /// Its place in the store's order.
+    vertex: u32,
+    /// 1/P₁: what it stands for, in multiples of itself.
+    stands_for: f32,
+}
+
+/// Probabilities of one group of cache points.
+#[derive(Debug, Default)]
+pub(super) struct GroupPmf {
+    /// First of its cache points.
+    first: usize,
+    /// Entries of the second stage.
+    entries: Vec<Entry>,
+    /// Entries of each cache point: of `entries` or, with one stage, all vertices.
+    count: usize,
+    /// For each cache point and entry, the sum of what the entries up to it bring, over the whole: cumulative probabilities. All zero
+    /// where nothing is brought.
+    cdf: Vec<f32>,
+    /// For each cache point, estimates of both normalisations Q.
+    found: Vec<[f64; 2]>,
+    ranges: Vec<Range<usize>>,
+}
+
+/// A choice among entries.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Choice {
+    /// Place of the light vertex in the store's order.
+    pub vertex: usize,
+    /// Probability of the vertex among all: P₁ P₂.
+    pub probability: f32,
+}
+
+/// Every cache point's probabilities of an iteration's light vertices.
+#[derive(Debug, Default)]
+pub(super) struct Pmfs {
+    groups: Vec<GroupPmf>,
+    /// For each cache point its group.
+    group_of: Vec<u32>,
+}
+
+impl GroupPmf {
+    #[inline]
+    fn row(&self, cache: usize) -> Option<&[f32]> {
+        let cdf = &self.cdf[(cache - self.first) * self.count..][..self.count];
+        cdf.last().is_some_and(|&top| top > 0.0).then_some(cdf)
+    }
+
+    /// The first stage: draws one vertex of each cluster of a cut.
+    fn draw_entries(
+        &mut self,
+        caches: &Caches,
+        group: &Range<usize>,
+        store: &LightStore,
+        clusters: usize,
+        rng: &mut HashRng,
+        memory: &mut CutMemory,
+    ) {
+        store.tree.cut(&caches.viewpoint(group), clusters, memory, &mut self.ranges);
+        self.entries.clear();
+        self.entries.extend(self.ranges.iter().filter_map(|cluster| {
+            let (vertex, p) = store.tree.draw(cluster, rng.next_f32())?;
+            Some(Entry { vertex: vertex as u32, stands_for: (1.0 / p) as f32 })
+        }));
+    }
+
+    /// The last stage: what every entry brings to every cache point of the group.
+    fn fill(&mut self, caches: &Caches, group: &Range<usize>, store: &LightStore, tracer: &mut Tracer) {
+        self.first = group.start;
+        self.cdf.clear();
+        self.cdf.resize(group.len() * self.count, 0.0);
+        self.found.clear();
+        self.found.resize(group.len(), [0.0; 2]);
+        let (points, sides) = (&caches.index.points()[group.clone()], &caches.index.normals()[group.clone()]);
+        for e in 0..self.count {
+            let entry = self.entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, stands_for: 1.0 });
+            let y = store.vertex(entry.vertex as usize);
+            let mut packet = SegmentPacket::default();
+            let mut asked = [(0usize, 0.0f32); PACKET];
+            for c in 0..group.len() {
+                let brings = y.brings(points[c], sides[c]);
+                self.found[c][1] += f64::from(brings.unscattered * entry.stands_for);
+                let scattered = brings.scattered * entry.stands_for;
+                if scattered > 0.0 && scattered.is_finite() {
+                    asked[packet.len] = (c, scattered);
+                    packet.push(&segment(
+                        caches.end(group.start + c),
+                        &SegmentEnd::Surface { p: y.point.p, error: y.point.error, ng: y.point.ng },
+                    ));
+                }
+            }
+            if packet.len == 0 {
+                continue;
+            }
+            let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
+            for (i, &(c, brings)) in asked[..packet.len].iter().enumerate() {
+                if blocked >> i & 1 == 0 {
+                    self.cdf[c * self.count + e] = brings;
+                }
+            }
+        }
+        if self.count > 0 {
+            for (cdf, found) in self.cdf.chunks_exact_mut(self.count).zip(&mut self.found) {
+                found[0] = accumulate(cdf);
+                *found = found.map(|sum| sum / f64::from(store.paths_traced));
+            }
+        }
+    }
+}
+
+/// Turns what entries bring into cumulative probabilities; returns the sum.
+fn accumulate(cdf: &mut [f32]) -> f64 {
+    let mut sum = 0.0f64;
+    for c in cdf.iter_mut() {
+        sum += f64::from(*c);
+        *c = sum as f32;
+    }
+    if sum > 0.0 {
+        cdf.iter_mut().for_each(|c| *c = (f64::from(*c) / sum) as f32);
+    }
+    sum
+}
+
+impl Pmfs {
+    /// Finds the probabilities of the vertices of `store`, of which `second_stage` asks for a first stage that leaves so many. `random`
+    /// is the seed and the number of the set.
+    pub fn find(
+        &mut self,
+        scene: &PreparedScene,
+        caches: &Caches,
+        store: &LightStore,
+        second_stage: Option<usize>,
+        random: (u64, u64),
+    ) -> RayStats {
+        self.groups.resize_with(caches.groups.len(), GroupPmf::default);
+        if self.group_of.len() != caches.index.len() {
+            let number = |(g, range): (usize, &Range<usize>)| std::iter::repeat_n(g as u32, range.len());
+            self.group_of = caches.groups.iter().enumerate().flat_map(number).collect();
+        }
+        self.groups
+            .par_iter_mut()
+            .zip(&caches.groups)
+            .enumerate()
+            .map_init(CutMemory::default, |memory, (number, (pmf, group))| {
+                let mut tracer = Tracer::new(&*scene.query);
+                match second_stage {
+                    None => pmf.count = store.len(),
+                    Some(clusters) => {
+                        let mut rng = HashRng::new(random.0, FIRST_STAGE_STREAM, number as u64, random.1);
+                        pmf.draw_entries(caches, group, store, clusters, &mut rng, memory);
+                        pmf.count = pmf.entries.len();
+                    }
+                }
+                pmf.fill(caches, group, store, &mut tracer);
+                tracer.stats
+            })
+            .reduce(RayStats::default, |mut a, b| {
+                a.merge(&b);
+                a
+            })
+    }
+
+    /// For every cache point, what this iteration says of its normalisations.
+    pub fn found(&self) -> impl Iterator<Item = &[f64; 2]> {
+        self.groups.iter().flat_map(|g| &g.found)
+    }
+
+    /// Draws from the mixture of the probabilities at `n` cache points, all of one group if there are two stages, and an equal share of
+    /// all entries; `None` if there are no entries. There is at least one cache point.
+    #[inline]
+    pub fn draw(&self, caches: &[usize], u: [f32; 2]) -> Option<Choice> {
+        let group = &self.groups[*self.group_of.get(*caches.first()?)? as usize];
+        let entries = group.count;
+        if entries == 0 {
+            return None;
+        }
+        let n = caches.len().min(3);
+        let mut rows: [Option<&[f32]>; 3] = [None; 3];
+        for (row, &cache) in rows.iter_mut().zip(caches) {
+            *row = self.groups[self.group_of[cache] as usize].row(cache);
+        }
+        let uniform = 1.0 / entries as f32;
+        let share = 1.0 / (n + 1) as f32;
+        let chosen = ((u[0] * (n + 1) as f32) as usize).min(n);
+        let e = match rows.get(chosen) {
+            Some(Some(cdf)) if chosen < n => cdf.partition_point(|&c| c <= u[1]),
+            // A cache point that no light vertex reaches draws uniformly, as the last share does.
+            _ => (u[1] * entries as f32) as usize,
+        }
+        .min(entries - 1);
+        let mut p = share * uniform;
+        for cdf in &rows[..n] {
+            p += share
+                * match cdf {
+                    Some(cdf) => cdf[e] - if e == 0 { 0.0 } else { cdf[e - 1] },
+                    None => uniform,
+                };
+        }
+        Some(match group.entries.get(e) {
+            Some(entry) => Choice { vertex: entry.vertex as usize, probability: p / entry.stands_for },
+            None => Choice { vertex: e, probability: p },
+        })
+    }
+}

@@ -1,0 +1,136 @@
+//! What happens between iterations: light sub-paths are traced, probabilities found, normalisations learnt, states restored.
+
+use super::Settings;
+use super::caches::Caches;
+use super::pmfs::Pmfs;
+use super::resampler::Resampler;
+use super::store::LightStore;
+use crate::integrators::Iteration;
+use crate::integrators::bdpt::{Bidirectional, Piece};
+use crate::ray::{Phases, RayStats};
+
+/// Sets of light sub-paths that estimate normalisations before the first iteration.
+const WARM_UP: u64 = 4;
+/// Light sub-paths to draw from where nothing else is asked for.
+const MOST_BY_DEFAULT: u32 = 10_000;
+/// Light sub-paths of one of these sets, at most.
+const WARM_UP_PATHS: u32 = 4000;
+
+impl Bidirectional {
+    /// Connections are resampled from now on.
+    pub(in crate::integrators) fn resample(&mut self, settings: Settings) {
+        self.weigher.techniques.set_connections(settings.samples as f32);
+        self.connects &= settings.samples == 0;
+        self.resampler = Some(Resampler::new(settings));
+    }
+
+    /// Connections of this iteration are drawn from light sub-paths that are traced before.
+    pub(in crate::integrators) fn resamples(&self) -> bool {
+        self.resampler.is_some() && self.weigher.techniques.uses_connections() && self.limits.max_edges >= 3
+    }
+
+    /// Cache points and first normalisations, once; they are functions of scene and seed alone.
+    fn prepare_caches(&mut self, iteration: &Iteration, stats: &mut RayStats) {
+        let scene = iteration.scene;
+        let Some(resampler) = &mut self.resampler else { return };
+        if resampler.settings.paths == 0 {
+            let [width, height] = scene.film_size;
+            resampler.settings.paths = width.saturating_mul(height).min(MOST_BY_DEFAULT);
+        }
+        let Settings { cache_fraction, second_stage, paths, .. } = resampler.settings;
+        let clusters = second_stage.map(|m2| m2 as usize);
+        let (mut caches, s) = Caches::new(scene, iteration.seed, cache_fraction, &self.limits, second_stage.is_some());
+        stats.merge(&s);
+        let first = Iteration { index: 0, ..*iteration };
+        let (mut seen, mut pmfs) = ([0, 0], Pmfs::default());
+        for set in 1..=WARM_UP {
+            let (store, s) = LightStore::trace(self, &first, paths.min(WARM_UP_PATHS), set);
+            stats.merge(&s);
+            // Random numbers of iterations count from zero up, those of warm-ups from the top down.
+            stats.merge(&pmfs.find(scene, &caches, &store, clusters, (iteration.seed, u64::MAX - set)));
+            caches.learn(pmfs.found());
+            seen = [seen[0] + store.len() as u64, seen[1] + u64::from(store.paths_traced)];
+        }
+        if let Some(resampler) = &mut self.resampler {
+            resampler.seen = seen;
+            resampler.caches = Some(caches);
+        }
+    }
+
+    /// Gets the candidates of an iteration ready. All its light sub-paths are traced, and what the lens sees of them is brought back:
+    /// those to draw from are the first of them.
+    pub(in crate::integrators) fn prepare_resampling(&mut self, iteration: &Iteration) -> (RayStats, Vec<Piece>) {
+        let (mut stats, mut phases) = (RayStats::default(), Phases::default());
+        if self.resampler.as_ref().is_some_and(|r| r.caches.is_none()) {
+            phases.time("placing caches", || self.prepare_caches(iteration, &mut stats));
+        }
+        let Some(resampler) = &mut self.resampler else { return (stats, vec![]) };
+        self.weigher.resampled = resampler.resampled();
+        let Settings { second_stage, paths, .. } = resampler.settings;
+        let mut store = std::mem::take(&mut resampler.store);
+        let pieces = phases.time("light paths", || self.light_pass(iteration, paths, &mut store));
+        phases.time("light tree", || store.finish());
+        let Some(resampler) = &mut self.resampler else { return (stats, pieces) };
+        resampler.store = store;
+        if let Some(caches) = &resampler.caches {
+            let (pmfs, store) = (&mut resampler.pmfs, &resampler.store);
+            let random = (iteration.seed, iteration.index);
+            stats.merge(&phases.time("pmfs", || {
+                pmfs.find(iteration.scene, caches, store, second_stage.map(|m2| m2 as usize), random)
+            }));
+        }
+        stats.phases.merge(&phases);
+        (stats, pieces)
+    }
+
+    /// Gets the candidates of an iteration ready as they were when it was rendered; once for any number of pixels.
+    pub(in crate::integrators) fn prepare_replay(&mut self, iteration: &Iteration) {
+        let Some(resampler) = &mut self.resampler else { return };
+        let wanted = (iteration.seed, iteration.index);
+        if resampler.ready == Some(wanted) {
+            return;
+        }
+        *resampler = Resampler::new(resampler.settings);
+        if !self.resamples() {
+            return;
+        }
+        // What an iteration knows comes from those before it.
+        for index in 0..iteration.index {
+            self.prepare_resampling(&Iteration { index, ..*iteration });
+            self.learn();
+        }
+        self.prepare_resampling(iteration);
+        if let Some(resampler) = &mut self.resampler {
+            resampler.ready = Some(wanted);
+        }
+    }
+
+    /// The iteration is over: what it found may now be known.
+    pub(in crate::integrators) fn learn(&mut self) {
+        if let Some(resampler) = &mut self.resampler
+            && let Some(caches) = &mut resampler.caches
+        {
+            caches.learn(resampler.pmfs.found());
+            resampler.seen[0] += resampler.store.len() as u64;
+            resampler.seen[1] += u64::from(resampler.store.paths_traced);
+        }
+    }
+
+    /// Goes on from a saved state.
+    pub(in crate::integrators) fn restore_resampling(&mut self, iteration: &Iteration, bytes: &[u8]) -> bool {
+        let mut words = bytes.chunks_exact(8).map(|c| u64::from_le_bytes(c.try_into().unwrap_or_default()));
+        let (Some(iterations), Some(vertices), Some(paths)) = (words.next(), words.next(), words.next()) else {
+            return bytes.is_empty();
+        };
+        self.prepare_caches(iteration, &mut RayStats::default());
+        let words: Vec<f64> = words.map(f64::from_bits).collect();
+        let (sums, rest) = words.as_chunks::<2>();
+        match &mut self.resampler {
+            Some(resampler) => {
+                resampler.seen = [vertices, paths];
+                rest.is_empty() && resampler.caches.as_mut().is_some_and(|c| c.restore(sums.to_vec(), iterations))
+            }
+            None => false,
+        }
+    }
+}

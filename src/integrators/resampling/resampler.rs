@@ -1,0 +1,120 @@
+//! What resampled connections know in an iteration: candidates, how to draw from them, and what weights need.
+
+use super::caches::Caches;
+use super::pmfs::{Choice, Pmfs};
+use super::store::LightStore;
+use super::{Settings, Weights};
+use crate::integrators::bdpt::eye_path::Candidate;
+use crate::math::Vec3;
+use crate::mis::{Resampled, Targets, Weigher};
+use crate::shade::SurfacePoint;
+use crate::spatial::nearest::MOST;
+
+/// The candidates of an iteration and how to draw from them.
+#[derive(Debug)]
+pub(in crate::integrators) struct Resampler {
+    pub settings: Settings,
+    pub(super) caches: Option<Caches>,
+    pub(super) store: LightStore,
+    pub(super) pmfs: Pmfs,
+    /// Sum over sets of the number of vertices, and of sub-paths.
+    pub(super) seen: [u64; 2],
+    /// Seed and number of the iteration that is ready to be replayed.
+    pub(super) ready: Option<(u64, u64)>,
+}
+
+/// The side of a point's surface on which the direction `d` leaves it.
+#[inline]
+fn side(point: &SurfacePoint, d: Vec3) -> Vec3 {
+    if point.ng.dot(d) < 0.0 { -point.ng } else { point.ng }
+}
+
+impl Resampler {
+    pub fn new(settings: Settings) -> Resampler {
+        Resampler {
+            settings,
+            caches: None,
+            store: LightStore::default(),
+            pmfs: Pmfs::default(),
+            seen: [0; 2],
+            ready: None,
+        }
+    }
+
+    /// Q of both targets at a point, on the side of the direction `d`.
+    #[inline]
+    pub fn there(&self, point: &SurfacePoint, d: Vec3) -> Targets {
+        match &self.caches {
+            Some(caches) if self.settings.weights != Weights::Balance => caches.there(point.p, side(point, d)),
+            _ => Targets::default(),
+        }
+    }
+
+    /// c of a sub-path that brings `brings` to a point from the direction `from`.
+    #[inline]
+    pub fn factor(&self, weigher: &Weigher, brings: Targets, point: &SurfacePoint, from: Vec3) -> f32 {
+        match &weigher.resampled {
+            None => 1.0,
+            Some(resampled) => resampled.factor(brings, self.there(point, from)),
+        }
+    }
+
+    /// What weights know.
+    pub(super) fn resampled(&self) -> Option<Resampled> {
+        let [vertices, paths] = self.seen;
+        let Settings { second_stage, .. } = self.settings;
+        let (paths_counted, second_stage) = match (self.settings.weights, second_stage) {
+            (Weights::Balance, _) => return None,
+            (Weights::TwoStage, _) | (Weights::OneStage, None) => (self.settings.paths, second_stage),
+            (Weights::OneStage, Some(clusters)) => (clusters.min(self.settings.paths), None),
+        };
+        Some(Resampled {
+            paths: paths_counted as f32,
+            second_stage: second_stage.map(|m2| m2 as f32),
+            epsilon: self.settings.epsilon,
+            uniform: 1.0 / (self.settings.neighbours + 1) as f32,
+            vertices_per_path: if paths > 0 { (vertices as f64 / paths as f64) as f32 } else { 0.0 },
+        })
+    }
+
+    /// Draws a candidate for an eye vertex at `point` that looks from the side of `wo`; `None` if there are none.
+    #[inline]
+    pub fn draw(&self, point: &SurfacePoint, wo: Vec3, u: [f32; 2]) -> Option<Candidate<'_>> {
+        if self.store.is_empty() {
+            return None;
+        }
+        let (mut near, mut n) = ([0; MOST], 0);
+        if let Some(caches) = &self.caches {
+            for i in caches.index.find(point.p, side(point, wo)).take(self.settings.neighbours) {
+                near[n] = i;
+                n += 1;
+            }
+        }
+        let Choice { vertex, probability } = match n {
+            0 => self.draw_anything(u[1])?,
+            _ => self.pmfs.draw(&near[..n], u)?,
+        };
+        let scale = 1.0 / (probability * self.settings.paths as f32 * self.settings.samples as f32);
+        Some(self.store.candidate(vertex, scale))
+    }
+
+    /// Far from all cache points: uniformly or, as a first stage would, by f_y/p.
+    fn draw_anything(&self, u: f32) -> Option<Choice> {
+        let all = self.store.len();
+        if self.settings.second_stage.is_none() {
+            let vertex = ((u * all as f32) as usize).min(all - 1);
+            return Some(Choice { vertex, probability: 1.0 / all as f32 });
+        }
+        let (vertex, p) = self.store.tree.draw(&(0..all), u)?;
+        Some(Choice { vertex, probability: p as f32 })
+    }
+
+    /// What must be saved to go on later, as bytes.
+    pub fn state(&self) -> Vec<u8> {
+        let Some(caches) = &self.caches else { return vec![] };
+        let (sums, iterations) = caches.state();
+        let mut words = vec![iterations, self.seen[0], self.seen[1]];
+        words.extend(sums.iter().flatten().map(|s| s.to_bits()));
+        words.into_iter().flat_map(u64::to_le_bytes).collect()
+    }
+}
