@@ -76,6 +76,28 @@ fn a_replay_is_the_rendered_sample() {
     }
 }
 
+/// Resampled connections know what iterations before them found, and how much effort was decided then.
+#[test]
+fn a_replay_knows_the_iterations_before_it() {
+    let sandbox = Sandbox::new();
+    sandbox.write_box_with("scene.xml", "<film type=\"hdrfilm\">", "<film type=\"hdrfilm\"><rfilter type=\"box\"/>");
+    for integrator in ["ris", "two-stage", "bdpt -p skip=auto"] {
+        let options = format!("-i {integrator} -p techniques=-*:1 --seed 4");
+        let pixel = |spp: u32| {
+            sandbox.run(&format!("render scene.xml {options} --spp {spp} -o a.pfm --quiet")).expect(0, &[]);
+            image(&sandbox, "a.pfm").rgb(9, 6).to_array().map(|v| v * spp as f32)
+        };
+        let (two, three) = (pixel(2), pixel(3));
+        let text = sandbox.run(&format!("replay scene.xml {options} --pixel 9,6 --iteration 2")).expect(0, &[]).stdout;
+        let sum = text.lines().last().unwrap().rsplit_once('(').unwrap().1.trim_end_matches(')').to_owned();
+        let sum: Vec<f32> = sum.split_whitespace().map(|v| v.parse().unwrap()).collect();
+        for (i, a) in sum.iter().enumerate() {
+            let rendered = three[i] - two[i];
+            assert!((a - rendered).abs() <= 1e-5 * three[i].abs(), "{integrator}: {a} {rendered}");
+        }
+    }
+}
+
 #[test]
 fn techniques_are_switched_by_name() {
     let sandbox = Sandbox::new();

@@ -124,7 +124,7 @@ fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
     let light = |i: usize| d.light.get(i).copied().unwrap_or(0.0);
     let (light_nodes, light_joint) = side(s, &light, &|i| d.eye[i], &smooth);
     let (eye_nodes, eye_joint) = side(k + 1 - s, &|i| d.eye[k - i], &|i| light(k - i), &|i| smooth(k - i));
-    weigher.weight(&Split {
+    let weight = weigher.weight(&Split {
         light: &light_nodes,
         light_joint,
         eye: &eye_nodes,
@@ -134,7 +134,8 @@ fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
         factor: 1.0,
         arriving: Rgb::BLACK,
         adjoint: Rgb::BLACK,
-    })
+    });
+    weight.own
 }
 
 #[test]

@@ -279,6 +279,9 @@ fn summarise(stats: &RenderStats, written: &[PathBuf]) {
         100.0 * stats.ray_query_share,
         stats.backend
     );
+    for line in &stats.notes {
+        note!("{}: {line}", stats.integrator);
+    }
     if let Some(e) = &stats.error {
         let estimate = e.estimate.map_or("not known".into(), |v| format!("{v:.3e}"));
         note!("{} by estimate {estimate} (target {:e})", e.measure, e.target);

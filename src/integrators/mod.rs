@@ -72,6 +72,11 @@ pub trait Integrator: Send {
         state.is_empty()
     }
 
+    /// What it decided by itself, for people to read.
+    fn notes(&self) -> Vec<String> {
+        vec![]
+    }
+
     /// Starts to keep a picture of every technique, for paths of up to `max_edges` edges; false if there are no techniques to tell apart.
     fn keep_pyramid(&mut self, _window: [u32; 4], _max_edges: usize) -> bool {
         false

@@ -5,19 +5,22 @@
 //! never multiplied up, and squares are taken of ratios so that they do not overflow.
 //!
 //! Next event and hits of a path tracer are two techniques, weighed by [`Heuristic::weight`]. Bidirectional ones are many: each
-//! sub-path keeps its densities in a [`Side`], and a [`Weigher`] weighs a path that joins two of them.
+//! sub-path keeps its densities in a [`Side`], and a [`Weigher`] weighs a path that joins two of them. [`effort`] tells from weights how many
+//! samples of each kind a scene is worth.
 //! [`definition`] says the same once more, slowly and in double precision, for tests and for explaining single paths.
 
 pub mod definition;
+pub mod effort;
 pub mod resampled;
 pub mod side;
 pub mod techniques;
 pub mod weigh;
 
+pub use effort::{Costs, Effort, EffortStatistics};
 pub use resampled::{Resampled, Targets};
 pub use side::{Node, Side, spread};
 pub use techniques::{Techniques, TechniquesError};
-pub use weigh::{Joint, Split, Weigher};
+pub use weigh::{Joint, Split, Weigher, Weight};
 
 use crate::math::SolidAnglePdf;
 

@@ -64,6 +64,23 @@ pub struct Weigher {
     pub resampled: Option<Resampled>,
 }
 
+/// What a path's techniques weigh; all weights of a path sum to one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Weight {
+    /// The one that sampled it.
+    pub own: f32,
+    /// Those with t = 1.
+    pub light_image: f32,
+    /// Those with s ≥ 2 and t ≥ 2.
+    pub connections: f32,
+}
+
+/// Sums by kind of technique.
+const KINDS: usize = 3;
+const OTHERS: usize = 0;
+const LIGHT_IMAGE: usize = 1;
+const CONNECTIONS: usize = 2;
+
 impl Weigher {
     /// n_s c_s, connectability apart; `factor` is c where connections are resampled.
     #[inline]
@@ -83,13 +100,30 @@ impl Weigher {
         if index >= self.roulette_from as usize { node.survival } else { 1.0 }
     }
 
-    /// Σ over the techniques that have fewer than all vertices of `side`, relative to the one that has all of them and the factor 1;
-    /// `other` is the number of vertices of the other side, `share(n)` the share of the technique with n vertices on this side.
+    /// Which sum a technique's share belongs to.
     #[inline]
-    fn outward(&self, side: &[Node], joint: &Joint, other: usize, mut share: impl FnMut(usize) -> f32) -> f32 {
+    fn kind(s: usize, t: usize) -> usize {
+        match (s, t) {
+            (_, 1) => LIGHT_IMAGE,
+            (2.., _) => CONNECTIONS,
+            _ => OTHERS,
+        }
+    }
+
+    /// Adds up, by kind, the shares of the techniques that have fewer than all vertices of `side`, relative to the one that has all of them and the
+    /// factor 1; `other` is the number of vertices of the other side, `share(n)` the share of the technique with n vertices on this side,
+    /// with its kind.
+    #[inline]
+    fn outward(
+        &self,
+        side: &[Node],
+        joint: &Joint,
+        other: usize,
+        sums: &mut [f32; KINDS],
+        mut share: impl FnMut(usize) -> (f32, usize),
+    ) {
         let n = side.len();
         let mut product = 1.0;
-        let mut sum = 0.0;
         for i in (0..n).rev() {
             let ratio = if i + 1 == n {
                 joint.arrival.0 / side[i].forward.0
@@ -105,15 +139,14 @@ impl Weigher {
             }
             // The technique's connection is the edge from vertex i − 1 to vertex i of this side.
             let smooth = i == 0 || (side[i - 1].smooth && (i + 1 == n || side[i].smooth));
-            let share = share(i);
+            let (share, kind) = share(i);
             if smooth {
                 let term = self.heuristic.power(share);
                 if term > 0.0 {
-                    sum += product * term;
+                    sums[kind] += product * term;
                 }
             }
         }
-        sum
     }
 
     /// c of the technique with n eye vertices, asked for from the connection outwards: the sub-path that a light's walk would have
@@ -139,24 +172,26 @@ impl Weigher {
         resampled.factor(brings, eye[n - 1].there)
     }
 
-    /// The weight of the technique that sampled the path.
+    /// The weight of the technique that sampled the path, and of kinds of techniques.
     #[inline]
-    pub fn weight(&self, path: &Split) -> f32 {
+    pub fn weight(&self, path: &Split) -> Weight {
         let (s, t) = (path.light.len(), path.eye.len());
         let edges = s + t;
         let own = self.heuristic.power(self.share(s, t, path, path.factor));
-        let from_light =
-            self.outward(path.light, &path.light_joint, t, |n| self.share(n, edges - n, path, path.light[n].factor));
-        let from_eye = match &self.resampled {
-            None => self.outward(path.eye, &path.eye_joint, s, |n| self.share(edges - n, n, path, 1.0)),
-            Some(resampled) => {
-                let mut arriving = path.arriving;
-                self.outward(path.eye, &path.eye_joint, s, |n| {
-                    let factor = self.eye_factor(resampled, path, n, &mut arriving);
-                    self.share(edges - n, n, path, factor)
-                })
-            }
-        };
-        own / (own + from_light + from_eye)
+        let mut sums = [0.0; KINDS];
+        sums[Self::kind(s, t)] = own;
+        self.outward(path.light, &path.light_joint, t, &mut sums, |n| {
+            (self.share(n, edges - n, path, path.light[n].factor), Self::kind(n, edges - n))
+        });
+        let mut arriving = path.arriving;
+        self.outward(path.eye, &path.eye_joint, s, &mut sums, |n| {
+            let factor = match &self.resampled {
+                None => 1.0,
+                Some(resampled) => self.eye_factor(resampled, path, n, &mut arriving),
+            };
+            (self.share(edges - n, n, path, factor), Self::kind(edges - n, n))
+        });
+        let scale = 1.0 / (sums[OTHERS] + sums[LIGHT_IMAGE] + sums[CONNECTIONS]);
+        Weight { own: own * scale, light_image: sums[LIGHT_IMAGE] * scale, connections: sums[CONNECTIONS] * scale }
     }
 }

@@ -64,6 +64,8 @@ pub struct Outcome {
     pub cpu_seconds: Option<f64>,
     /// Iterations of this run.
     pub iterations: u64,
+    /// What the integrator decided by itself.
+    pub notes: Vec<String>,
 }
 
 /// Renders into `film` until the budget is used up or `interrupt` is set; calls `watch` after every iteration, which may save a
@@ -98,7 +100,8 @@ pub fn render(
         );
     };
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
-    Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations: film.iterations - first }
+    let (iterations, notes) = (film.iterations - first, integrator.notes());
+    Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations, notes }
 }
 
 pub(super) fn share(budget: &Budget, film: &Film, elapsed: Duration) -> f64 {

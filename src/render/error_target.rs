@@ -128,5 +128,5 @@ pub fn render_to_target(
     }
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
     let iterations = film.iterations;
-    (Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations }, estimate)
+    (Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations, notes: integrators[0].notes() }, estimate)
 }

@@ -111,6 +111,9 @@ pub struct RenderStats {
     pub threads: usize,
     /// Ray-query backend and its version.
     pub backend: String,
+    /// What the integrator decided by itself.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Integrator.
     pub integrator: &'static str,
     /// Program version.
@@ -159,6 +162,7 @@ impl RenderStats {
             seed,
             threads,
             backend: scene.query.describe(),
+            notes: outcome.notes.clone(),
             integrator,
             version: env!("CARGO_PKG_VERSION"),
             scene: SceneStats {

@@ -9,7 +9,7 @@ use crate::integrators::replay::{Contribution, Replay};
 use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{Joint, Node, Side, Split, Targets, spread};
+use crate::mis::{Joint, Node, Side, Split, Targets, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment, survival};
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
@@ -51,8 +51,8 @@ pub(in crate::integrators) struct Candidate<'a> {
 }
 
 impl<'a> Candidate<'a> {
-    /// A vertex of a sub-path that is joined as it is.
-    fn of(path: &'a LightPath, vertex: &'a LightVertex) -> Candidate<'a> {
+    /// A vertex of a sub-path that is joined as it is, and counts `scale` times.
+    fn of(path: &'a LightPath, vertex: &'a LightVertex, scale: f32) -> Candidate<'a> {
         Candidate {
             vertex,
             nodes: path.side.first(vertex.s),
@@ -60,7 +60,7 @@ impl<'a> Candidate<'a> {
             light_can_be_hit: path.light_can_be_hit,
             origin: path.origin,
             number: None,
-            scale: 1.0,
+            scale,
         }
     }
 }
@@ -98,7 +98,7 @@ impl EyeHooks<'_, '_> {
         (s, t): (usize, usize),
         (origin, number): (Option<Origin>, Option<u32>),
         raw: Rgb,
-        weight: f32,
+        weight: Weight,
     ) -> Found {
         let (scene, weigher, pixel, lens) = (self.scene, &self.this.weigher, self.pixel, self.lens);
         let (this, iteration) = (self.this, self.iteration);
@@ -111,7 +111,7 @@ impl EyeHooks<'_, '_> {
             }
             let path = origin.map(|origin| record.path(origin, s, n_eye, lens));
             let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(Targets::default(), |r| r.there(p, d));
-            record.found(scene, weigher, &there, Contribution::new((s, t), pixel, raw, weight), path)
+            record.found(scene, weigher, &there, Contribution::new((s, t), pixel, raw, weight.own), path)
         });
         Found { x: pixel.0, y: pixel.1, path: 0, note, s: s as u16, t: t as u16, raw, weight }
     }
@@ -200,7 +200,7 @@ impl EyeHooks<'_, '_> {
         sample: &DirectSample,
         density: SolidAnglePdf,
         bsdf_pdf: SolidAnglePdf,
-    ) -> f32 {
+    ) -> Weight {
         let t = vertex.index as usize + 1;
         let point = vertex.point;
         let cos = point.ng.dot(sample.wi);
@@ -333,13 +333,15 @@ impl WalkHooks for EyeHooks<'_, '_> {
             match &this.resampler {
                 None => {
                     for y in light.vertices.iter().filter(|y| possible(y)) {
-                        self.connect(vertex, &Candidate::of(light, y), tracer);
+                        self.connect(vertex, &Candidate::of(light, y, 1.0 / this.effort.connections), tracer);
                     }
                 }
                 Some(resampler) => {
                     for _ in 0..resampler.settings.samples {
                         let u = sampler.rng().next_4();
-                        if let Some(candidate) = resampler.draw(vertex.point, vertex.wo, [u[0], u[1]])
+                        let effort = this.effort.connections;
+                        if u[2] < effort
+                            && let Some(candidate) = resampler.draw(vertex.point, vertex.wo, [u[0], u[1]], effort)
                             && possible(candidate.vertex)
                         {
                             self.connect(vertex, &candidate, tracer);

@@ -13,21 +13,27 @@
 
 pub(super) mod eye_path;
 pub(super) mod light_path;
+pub(super) mod sizing;
+mod worker;
 
 use super::resampling::Resampler;
 use super::resampling::store::LightStore;
 use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params, Replay};
-use crate::film::{Film, FilmTile, LightImage, Part, Pyramid, SampleBuffer, Splat};
+use crate::film::{Film, FilmTile, LightImage, Pyramid, SampleBuffer};
 use crate::math::Rgb;
+use crate::math::hash::HashRng;
 use crate::math::sampler::PathSampler;
-use crate::mis::{Heuristic, Side, Techniques, Weigher};
-use crate::path::{Limits, ShadowQueue, WalkStart, walk};
+use crate::mis::{Effort, Heuristic, Techniques, Weigher, Weight};
+use crate::path::{Limits, WalkStart, walk};
 use crate::prepared::{Features, PreparedScene};
 use crate::ray::{Phases, Ray, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use eye_path::{Arrival, EyeHooks, EyeQueues};
-use light_path::{LensQueue, LightPath};
+use light_path::LensQueue;
 use rayon::prelude::*;
+use sizing::Sizing;
+pub(super) use worker::Piece;
+use worker::{Harvest, Worker, add_to, splat};
 
 /// Parameters that every bidirectional method has.
 pub(super) const MAX_DEPTH: ParamSpec = ParamSpec {
@@ -40,7 +46,7 @@ pub(super) const RR_DEPTH: ParamSpec = ParamSpec {
     name: "rr_depth",
     about: "vertex (1 is the first hit), counted from either end, from which Russian roulette may end a sub-path",
     // Long paths are joined from short sub-paths: early roulette saves far more connections than it costs in variance.
-    default: ParamDefault::Int(1, 1, 1_000_000),
+    default: ParamDefault::Int(2, 1, 1_000_000),
 };
 /// See [`MAX_DEPTH`].
 pub(super) const HIDE_EMITTERS: ParamSpec = ParamSpec {
@@ -72,19 +78,27 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
             default: ParamDefault::Choice("balance", &["balance", "power"]),
         },
         TECHNIQUES,
+        sizing::parameter("never"),
     ],
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
     build: |params| {
         let heuristic = if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power };
-        Box::new(Bidirectional::new(params, heuristic, params.techniques("techniques")))
+        let mut this = Bidirectional::new(params, heuristic, params.techniques("techniques"));
+        // What is known of other numbers of samples holds for the balance heuristic.
+        if params.choice("skip") == "auto" && heuristic == Heuristic::Balance {
+            this.size_by_scene();
+        }
+        Box::new(this)
     },
 };
 
 /// The random streams of sub-paths.
 const EYE_STREAM: u64 = 1;
 const LIGHT_STREAM: u64 = 3;
+/// The random stream of the choice which pixels have light sub-paths.
+const CHOICE_STREAM: u64 = 7;
 /// Light sub-paths in a piece of work that has no eye sub-paths.
 const LIGHT_PATHS_AT_ONCE: u32 = 512;
 
@@ -104,8 +118,8 @@ pub(crate) struct Found {
     pub t: u16,
     /// Contribution of the technique by itself.
     pub raw: Rgb,
-    /// Its weight.
-    pub weight: f32,
+    /// Its weight, with those of kinds of techniques.
+    pub weight: Weight,
 }
 
 /// Bidirectional path tracing with any set of techniques; light tracing is one of them.
@@ -117,53 +131,15 @@ pub(super) struct Bidirectional {
     pub(super) connects: bool,
     /// Connections are drawn from many light sub-paths instead.
     pub(super) resampler: Option<Resampler>,
+    /// How many samples of each kind of technique this iteration takes.
+    pub(super) effort: Effort,
+    /// Where that is decided, if it is.
+    sizing: Option<Sizing>,
+    /// Contributions of every n-th sub-path are wanted by themselves in this iteration.
+    every: Option<u32>,
     /// One for each tile of the film, kept for their memory.
     samples: Vec<SampleBuffer>,
     pyramid: Option<Pyramid>,
-}
-
-/// What a worker keeps from one pixel to the next.
-struct Worker {
-    light: LightPath,
-    eye: Side,
-    direct: ShadowQueue<Found>,
-    connection: ShadowQueue<Found>,
-    lens: ShadowQueue<Found>,
-    splats: Vec<Splat>,
-    /// All that is visible, if a pyramid is wanted.
-    found: Vec<Found>,
-}
-
-/// What a worker brings back from a piece of work.
-pub(in crate::integrators) type Piece = (RayStats, Vec<Splat>, Vec<Found>);
-
-impl Worker {
-    fn new() -> Worker {
-        Worker {
-            light: LightPath::default(),
-            eye: Side::default(),
-            direct: ShadowQueue::new(RayKind::ShadowDirect),
-            connection: ShadowQueue::new(RayKind::ShadowConnection),
-            lens: ShadowQueue::new(RayKind::ShadowLens),
-            splats: vec![],
-            found: vec![],
-        }
-    }
-}
-
-/// Adds up what a tile's own eye sub-paths find.
-fn add_to(samples: &mut SampleBuffer, tile: &FilmTile, arrival: Arrival, found: Found) {
-    let part = match arrival {
-        Arrival::Hit => Part::AtOnce,
-        Arrival::Direct => Part::Direct,
-        Arrival::Connection => Part::Connection,
-    };
-    samples.add(part, tile.index(found.x, found.y), found.raw * found.weight);
-}
-
-fn splat(found: Found) -> Splat {
-    let Found { x, y, path, note, s, .. } = found;
-    Splat { x, y, path, vertex: u32::from(s), note, value: found.raw * found.weight }
 }
 
 impl Bidirectional {
@@ -178,9 +154,46 @@ impl Bidirectional {
             connects: techniques.uses_connections(),
             weigher: Weigher { techniques, heuristic, roulette_from: limits.roulette_from, resampled: None },
             resampler: None,
+            effort: Effort::FULL,
+            sizing: None,
+            every: None,
             samples: vec![],
             pyramid: None,
         }
+    }
+
+    /// From now on, numbers of samples are decided by the scene.
+    pub(super) fn size_by_scene(&mut self) {
+        let shared = self.resampler.is_none();
+        self.sizing = Some(Sizing::new(shared));
+    }
+
+    /// Settles the effort of iteration `index`.
+    fn begin(&mut self, scene: &PreparedScene, index: u64) {
+        self.effort = self.sizing.as_ref().map_or(Effort::FULL, |s| s.effort(index));
+        let pixels = scene.film_size[0] * scene.film_size[1];
+        self.every = match &self.pyramid {
+            Some(_) => Some(1),
+            None => self.sizing.as_ref().and_then(|s| s.every(index, pixels)),
+        };
+        let samples = self.resampler.as_ref().map_or(1, |r| r.settings.samples);
+        let techniques = &mut self.weigher.techniques;
+        techniques.set_connections(samples as f32 * self.effort.connections);
+        let light_paths = self.light_paths(scene);
+        self.weigher.techniques.set_light_paths(light_paths);
+    }
+
+    /// Contributions of sub-path `number` are wanted by themselves.
+    #[inline]
+    fn wants(&self, number: u32) -> bool {
+        self.every.is_some_and(|n| number.is_multiple_of(n))
+    }
+
+    /// Pixel `number` has a light sub-path in this iteration.
+    fn has_light_path(&self, iteration: &Iteration, number: u32) -> bool {
+        let effort = self.effort.light_image;
+        effort >= 1.0
+            || HashRng::new(iteration.seed, CHOICE_STREAM, u64::from(number), iteration.index).next_f32() < effort
     }
 
     /// Pixels have light sub-paths of their own.
@@ -188,9 +201,11 @@ impl Bidirectional {
         self.connects || self.weigher.techniques.uses_light_image()
     }
 
-    /// Light sub-paths of an iteration: one for every pixel of the full film.
+    /// Light sub-paths of an iteration for the light image: one for every pixel of the full film, or fewer; where pixels choose whether
+    /// they have one, the number that is expected.
     fn light_paths(&self, scene: &PreparedScene) -> f32 {
-        scene.film_size[0] as f32 * scene.film_size[1] as f32
+        let all = scene.film_size[0] as f32 * scene.film_size[1] as f32 * self.effort.light_image;
+        if self.resampler.is_some() { all.ceil() } else { all }
     }
 
     /// Random numbers of light sub-path `path`.
@@ -210,10 +225,10 @@ impl Bidirectional {
         keep_vertices: bool,
     ) {
         let mut sampler = self.light_sampler(iteration, path);
-        let (splats, all, keep) = (&mut worker.splats, &mut worker.found, self.pyramid.is_some());
+        let (splats, all) = (&mut worker.splats, &mut worker.found);
         let mut found = |found: Found| {
             splats.push(splat(found));
-            if keep {
+            if self.wants(found.path) {
                 all.push(found);
             }
         };
@@ -280,7 +295,7 @@ impl Bidirectional {
     ) -> Vec<Piece> {
         let scene = iteration.scene;
         let splat = match self.weigher.techniques.uses_light_image() {
-            true => scene.film_size[0] * scene.film_size[1],
+            true => self.light_paths(scene) as u32,
             false => 0,
         };
         let all = splat.max(kept);
@@ -323,18 +338,22 @@ impl Bidirectional {
         let scene = iteration.scene;
         let mut tracer = Tracer::new(&*scene.query);
         samples.clear(tile.pixels());
-        let (mut all, keep) = (vec![], self.pyramid.is_some());
+        let mut all = vec![];
         let mut found = |arrival: Arrival, found: Found| {
-            add_to(samples, tile, arrival, found);
-            if keep {
+            add_to(samples, tile, arrival, &found);
+            if self.wants(found.y * scene.film_size[0] + found.x) {
                 all.push(found);
             }
         };
         let techniques = &self.weigher.techniques;
         for pixel in 0..tile.pixels() {
             let (x, y) = tile.pixel(pixel);
+            let number = y * scene.film_size[0] + x;
             if !self.resamples() && self.uses_light_paths() {
-                self.light_path(iteration, y * scene.film_size[0] + x, worker, &mut tracer, None, self.connects);
+                match self.has_light_path(iteration, number) {
+                    true => self.light_path(iteration, number, worker, &mut tracer, None, self.connects),
+                    false => worker.light.vertices.clear(),
+                }
             }
             if techniques.uses_eye_paths() {
                 self.eye_path(iteration, (x, y), worker, &mut tracer, &mut found, None);
@@ -353,7 +372,8 @@ impl Bidirectional {
         let [x0, y0, width, height] = scene.window;
         for path in paths {
             let (x, y) = (path % scene.film_size[0], path / scene.film_size[0]);
-            if x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height {
+            let outside = x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height;
+            if outside && self.has_light_path(iteration, path) {
                 self.light_path(iteration, path, worker, &mut tracer, None, false);
             }
         }
@@ -361,42 +381,10 @@ impl Bidirectional {
     }
 }
 
-impl Worker {
-    /// Sends off what is queued for the lens and hands over all that was found.
-    fn finish(&mut self, this: &Bidirectional, mut tracer: Tracer) -> Piece {
-        let (splats, all, keep) = (&mut self.splats, &mut self.found, this.pyramid.is_some());
-        self.lens.flush(&mut tracer, |f| {
-            splats.push(splat(f));
-            if keep {
-                all.push(f);
-            }
-        });
-        (tracer.stats, std::mem::take(splats), std::mem::take(all))
-    }
-}
-
-/// Everything that all pieces of work brought back, in their order.
-#[derive(Default)]
-struct Harvest {
-    stats: RayStats,
-    splats: Vec<Vec<Splat>>,
-    found: Vec<Vec<Found>>,
-}
-
-impl Harvest {
-    fn add(&mut self, pieces: Vec<Piece>) {
-        for (stats, splats, found) in pieces {
-            self.stats.merge(&stats);
-            self.splats.push(splats);
-            self.found.push(found);
-        }
-    }
-}
-
 impl Integrator for Bidirectional {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
         let scene = iteration.scene;
-        self.weigher.techniques.set_light_paths(self.light_paths(scene));
+        self.begin(scene, iteration.index);
         let mut harvest = Harvest::default();
         if self.resamples() {
             let (stats, pieces) = self.prepare_resampling(iteration);
@@ -438,13 +426,22 @@ impl Integrator for Bidirectional {
         if self.resamples() {
             self.learn();
         }
+        if let (Some(sizing), Some(every)) = (&mut self.sizing, self.every)
+            && sizing.every(iteration.index, 1).is_some()
+        {
+            sizing.learn(film, harvest.found.iter().flatten(), every, &harvest.stats);
+        }
         if let Some(pyramid) = &mut self.pyramid {
             for f in harvest.found.iter().flatten() {
-                pyramid.add((f.s.into(), f.t.into()), (f.x, f.y), f.raw, f.weight);
+                pyramid.add((f.s.into(), f.t.into()), (f.x, f.y), f.raw, f.weight.own);
             }
             pyramid.iterations += 1;
         }
         harvest.stats
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.sizing.iter().filter_map(Sizing::note).collect()
     }
 
     fn keep_pyramid(&mut self, window: [u32; 4], max_edges: usize) -> bool {
@@ -457,22 +454,53 @@ impl Integrator for Bidirectional {
     }
 
     fn state(&self) -> Vec<u8> {
-        self.resampler.as_ref().map_or_else(Vec::new, Resampler::state)
+        let sizing = self.sizing.as_ref().map_or(vec![], Sizing::state);
+        let resampler = self.resampler.as_ref().map_or(vec![], Resampler::state);
+        if sizing.is_empty() && resampler.is_empty() {
+            return vec![];
+        }
+        let mut state = (sizing.len() as u64).to_le_bytes().to_vec();
+        state.extend(sizing.into_iter().flat_map(f64::to_le_bytes));
+        state.extend(resampler);
+        state
     }
 
     fn restore(&mut self, iteration: &Iteration, state: &[u8]) -> bool {
-        self.restore_resampling(iteration, state)
+        let Some((length, rest)) = state.split_first_chunk::<8>() else { return state.is_empty() };
+        let Some(length) = usize::try_from(u64::from_le_bytes(*length)).ok().and_then(|n| n.checked_mul(8)) else {
+            return false;
+        };
+        let Some((sizing, resampler)) = rest.split_at_checked(length) else { return false };
+        let sums: Vec<f64> = sizing.as_chunks::<8>().0.iter().map(|c| f64::from_le_bytes(*c)).collect();
+        let tiles = Film::new(iteration.scene.window).tiles.len();
+        let sized = match &mut self.sizing {
+            Some(own) => own.restore(&sums, tiles),
+            None => sums.is_empty(),
+        };
+        sized && self.restore_resampling(iteration, resampler)
     }
 
     fn replay(&mut self, iteration: &Iteration, (x, y): (u32, u32)) -> Replay {
         let scene = iteration.scene;
-        self.weigher.techniques.set_light_paths(self.light_paths(scene));
+        let missing = self.sizing.as_ref().map_or(0, |s| s.missing(iteration.index));
+        if missing >= 2 {
+            let mut film = Film::new(scene.window);
+            (0..missing).for_each(|index| {
+                self.iterate(&Iteration { index, ..*iteration }, &mut film);
+            });
+        }
+        self.begin(scene, iteration.index);
         self.prepare_replay(iteration);
         let (mut worker, mut tracer, mut replay) =
             (Worker::new(), Tracer::new(&*scene.query), Replay { pixel: (x, y), ..Replay::default() });
         let mut seen = vec![];
-        if self.uses_light_paths() {
-            let path = y * scene.film_size[0] + x;
+        let path = y * scene.film_size[0] + x;
+        let own = if self.resamples() {
+            (path as f32) < self.light_paths(scene)
+        } else {
+            self.has_light_path(iteration, path)
+        };
+        if own && self.uses_light_paths() {
             self.light_path(iteration, path, &mut worker, &mut tracer, Some(&mut replay), self.connects);
             // One sub-path may fill a packet and more: what has been answered already is among the splats.
             seen.extend(worker.splats.drain(..).map(|s| s.note));

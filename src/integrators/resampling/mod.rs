@@ -26,7 +26,8 @@ mod prepare;
 pub(in crate::integrators) mod resampler;
 pub(in crate::integrators) mod store;
 
-use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH, TECHNIQUES};
+use super::bdpt::sizing;
+use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, TECHNIQUES};
 use super::{IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::Heuristic;
 pub(in crate::integrators) use resampler::Resampler;
@@ -36,6 +37,8 @@ const PATHS: ParamSpec = ParamSpec {
     about: "M, light sub-paths per iteration from which eye vertices draw",
     default: ParamDefault::Int(200, 1, 10_000_000),
 };
+/// One of many connections is drawn: they need not be as many.
+const RR_DEPTH: ParamSpec = ParamSpec { default: ParamDefault::Int(1, 1, 1_000_000), ..super::bdpt::RR_DEPTH };
 const FIRST_STAGE: ParamSpec = ParamSpec {
     name: "paths",
     about: "M1, light sub-paths per iteration for the first stage; 0: 10000, or the number of pixels if that is less",
@@ -63,6 +66,7 @@ const EPSILON: ParamSpec = ParamSpec {
     about: "smallest ratio of densities p/q that weights use, in millionths",
     default: ParamDefault::Int(1000, 1, 1_000_000),
 };
+const SKIP: ParamSpec = sizing::parameter("auto");
 const fn weights(default: &'static str, choices: &'static [&'static str]) -> ParamSpec {
     ParamSpec {
         name: "weights",
@@ -72,14 +76,14 @@ const fn weights(default: &'static str, choices: &'static [&'static str]) -> Par
 }
 
 /// The parameters of methods with one stage; they differ in the weights they take by default.
-const fn one_stage(default_weights: &'static str) -> [ParamSpec; 10] {
+const fn one_stage(default_weights: &'static str) -> [ParamSpec; 11] {
     let weights = weights(default_weights, &["balance", "ris"]);
-    [MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, NEIGHBOURS, CACHES, EPSILON, weights]
+    [MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, NEIGHBOURS, CACHES, EPSILON, weights, SKIP]
 }
 
-const PCBPT_PARAMS: [ParamSpec; 10] = one_stage("balance");
-const RIS_PARAMS: [ParamSpec; 10] = one_stage("ris");
-const TWO_STAGE_PARAMS: [ParamSpec; 11] = [
+const PCBPT_PARAMS: [ParamSpec; 11] = one_stage("balance");
+const RIS_PARAMS: [ParamSpec; 11] = one_stage("ris");
+const TWO_STAGE_PARAMS: [ParamSpec; 12] = [
     MAX_DEPTH,
     RR_DEPTH,
     HIDE_EMITTERS,
@@ -91,6 +95,7 @@ const TWO_STAGE_PARAMS: [ParamSpec; 11] = [
     CACHES,
     EPSILON,
     weights("two-stage", &["balance", "ris", "two-stage"]),
+    SKIP,
 ];
 
 fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Integrator> {
@@ -109,6 +114,9 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
     };
     let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
     this.resample(settings);
+    if params.choice("skip") == "auto" {
+        this.size_by_scene();
+    }
     Box::new(this)
 }
 

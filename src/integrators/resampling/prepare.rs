@@ -19,7 +19,6 @@ const WARM_UP_PATHS: u32 = 4000;
 impl Bidirectional {
     /// Connections are resampled from now on.
     pub(in crate::integrators) fn resample(&mut self, settings: Settings) {
-        self.weigher.techniques.set_connections(settings.samples as f32);
         self.connects &= settings.samples == 0;
         self.resampler = Some(Resampler::new(settings));
     }

@@ -77,9 +77,10 @@ impl Resampler {
         })
     }
 
-    /// Draws a candidate for an eye vertex at `point` that looks from the side of `wo`; `None` if there are none.
+    /// Draws a candidate for an eye vertex at `point` that looks from the side of `wo`; `None` if there are none. Only a share
+    /// `effort` of draws is made.
     #[inline]
-    pub fn draw(&self, point: &SurfacePoint, wo: Vec3, u: [f32; 2]) -> Option<Candidate<'_>> {
+    pub fn draw(&self, point: &SurfacePoint, wo: Vec3, u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
         if self.store.is_empty() {
             return None;
         }
@@ -94,7 +95,7 @@ impl Resampler {
             0 => self.draw_anything(u[1])?,
             _ => self.pmfs.draw(&near[..n], u)?,
         };
-        let scale = 1.0 / (probability * self.settings.paths as f32 * self.settings.samples as f32);
+        let scale = 1.0 / (probability * self.settings.paths as f32 * self.settings.samples as f32 * effort);
         Some(self.store.candidate(vertex, scale))
     }
 
