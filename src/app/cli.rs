@@ -3,6 +3,7 @@
 use super::measure_args::{BenchArgs, ConvergeArgs, MergeArgs, ProfileArgs};
 use crate::ray::Backend;
 use crate::render::ErrorTarget;
+use crate::spatial::skeleton::DEFAULT_CELLS;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -175,6 +176,15 @@ pub(crate) struct ReplayArgs {
 pub(crate) struct InfoArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
+    /// Write the skeleton of empty space, nodes and edges, as lines: .ply or .obj
+    #[arg(long, value_name = "FILE")]
+    pub skeleton: Option<PathBuf>,
+    /// Draw the skeleton over the camera's view: .png, .exr or .pfm
+    #[arg(long, value_name = "FILE")]
+    pub skeleton_image: Option<PathBuf>,
+    /// Cubes along the longest side of the scene from which the skeleton is made
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_CELLS as u32, value_parser = clap::value_parser!(u32).range(8..=512))]
+    pub skeleton_cells: u32,
 }
 
 #[derive(Debug, Args)]
