@@ -2,7 +2,7 @@
 
 use super::Failure;
 use crate::image::{Layer, Picture, atomic_write, write_picture};
-use crate::math::{DVec3, Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3, hash::mix64};
 use crate::prepared::PreparedScene;
 use crate::ray::Ray;
 use crate::spatial::Skeleton;
@@ -99,9 +99,10 @@ impl Canvas {
     }
 }
 
-/// Draws the camera's view in grey, over it the edges in orange and the nodes in blue; what is behind something is faint.
+/// Draws the camera's view with a tint for each node that surfaces belong to (dark red: none), over it the edges in orange and the nodes
+/// in blue; what is behind something is faint.
 pub(crate) fn write_image(path: &Path, scene: &PreparedScene, skeleton: &Skeleton) -> Result<(), Failure> {
-    let mut canvas = view(scene);
+    let mut canvas = view(scene, skeleton);
     for [a, b] in &skeleton.edges {
         let [a, b] = [a, b].map(|&k| skeleton.nodes[k as usize].position);
         let mut last = None;
@@ -124,8 +125,14 @@ pub(crate) fn write_image(path: &Path, scene: &PreparedScene, skeleton: &Skeleto
     write_picture(path, &picture, 0.0).map_err(Failure::io)
 }
 
+/// A pale colour that neighbours in number do not share.
+fn tint(node: usize) -> Rgb {
+    let bits = mix64(node as u64);
+    Rgb::from([0, 8, 16].map(|shift| 0.45 + 0.55 * ((bits >> shift & 255) as f32 / 255.0)))
+}
+
 /// Surfaces, lighter the more they face the camera and the nearer they are.
-fn view(scene: &PreparedScene) -> Canvas {
+fn view(scene: &PreparedScene, skeleton: &Skeleton) -> Canvas {
     let size = scene.film_size;
     let pixel = |i: u32| {
         let raster = [(i % size[0]) as f32 + 0.5, (i / size[0]) as f32 + 0.5];
@@ -136,7 +143,9 @@ fn view(scene: &PreparedScene) -> Canvas {
         let (point, _) = scene.surface_point(&hit);
         let facing = point.frame.n.dot(ray.d).abs();
         let fog = 1.0 / (1.0 + hit.t / scene.radius);
-        (Rgb::grey((0.1 + 0.5 * facing) * fog), hit.t)
+        let normal = if point.ng.dot(ray.d) > 0.0 { -point.ng } else { point.ng };
+        let tint = skeleton.node_of(point.p, normal).map_or(Rgb::new(0.3, 0.0, 0.0), tint);
+        (tint * ((0.1 + 0.5 * facing) * fog), hit.t)
     };
     let (pixels, depth) = (0..size[0] * size[1]).into_par_iter().map(pixel).unzip();
     Canvas { size, pixels, depth }
