@@ -65,8 +65,8 @@ fn envelope(line: &mut [u32], scratch: &mut Scratch) {
     values.extend_from_slice(line);
     parabolas.clear();
     let f = |k: usize| i64::from(values[k]) + (k * k) as i64;
-    for k in 0..values.len() {
-        if values[k] >= FAR {
+    for (k, &value) in values.iter().enumerate() {
+        if value >= FAR {
             continue;
         }
         let mut from = i64::MIN;

@@ -18,8 +18,12 @@ pub fn tie(grid: &VoxelGrid, squared: &[u32]) -> Vec<bool> {
         return object;
     }
     let steps = grid.steps();
-    let faces: Vec<isize> =
-        steps.iter().zip(OFFSETS).filter(|(_, o)| o.iter().map(|c| c.abs()).sum::<isize>() == 1).map(|(s, _)| *s).collect();
+    let faces: Vec<isize> = steps
+        .iter()
+        .zip(OFFSETS)
+        .filter(|(_, o)| o.iter().map(|c| c.abs()).sum::<isize>() == 1)
+        .map(|(s, _)| *s)
+        .collect();
     let neighbour = |i: usize, step: isize| i.checked_add_signed(step).filter(|&n| n < squared.len());
 
     // Breadth first from the rim; solid cubes cost nothing, so that they come before all that is empty.

@@ -189,7 +189,9 @@ mod tests {
             }
             for &i in &curve {
                 let p = grid.centre(i);
-                let node = |n: &Node| distance(n.position, p) < n.radius.max(2.0) && n.radius.powi(2) > squared[i] as f32 - 1e-2;
+                let node = |n: &Node| {
+                    distance(n.position, p) < n.radius.max(2.0) && n.radius.powi(2) > squared[i] as f32 - 1e-2
+                };
                 assert!(graph.nodes.iter().any(node));
             }
             assert_eq!(pieces(graph.nodes.len(), &graph.edges), 2, "two rooms");

@@ -2,7 +2,8 @@
 //!
 //! Distances count steps to the 26 neighbours with 3 over a face, 4 over an edge and 5 over a corner (Borgefors 1986), close to three
 //! times the Euclidean length. Whole numbers make ties exact; they go to the node with the smaller number. Since solid surfaces are
-//! closed against steps over corners, nobody gets a node on the other side of a wall.
+//! closed against steps over corners, nobody gets a node on the other side of a wall; only pockets without any node, which the filter
+//! leaves, take that of their neighbours.
 
 use super::voxels::{OFFSETS, VoxelGrid};
 use crate::math::Vec3;
@@ -36,7 +37,8 @@ pub struct NodeMap {
 impl NodeMap {
     /// Spreads the nodes, which stand in the cubes `nodes`, through the empty cubes of `grid`.
     pub fn new(grid: &VoxelGrid, nodes: &[usize]) -> NodeMap {
-        let (_, labels) = spread(grid, nodes);
+        let (_, mut labels) = spread(grid, nodes);
+        fill_pockets(grid, &mut labels);
         let labels = if nodes.len() < usize::from(u16::MAX) {
             Labels::Short(labels.into_iter().map(|k| u16::try_from(k).unwrap_or(u16::MAX)).collect())
         } else {
@@ -84,41 +86,70 @@ impl NodeMap {
         STEPS_OFF.iter().find_map(|&s| self.label(at + normal * s)).or_else(|| self.near(at, normal))
     }
 
-    /// The nearest of the cubes around that has a node. Nearness is counted from off the surface.
+    /// The nearest of the cubes around that has a node: of the 26 neighbours, or else of those one further out. Nearness is counted
+    /// from off the surface.
     #[cold]
     fn near(&self, at: Vec3, normal: Vec3) -> Option<usize> {
-        let mut best: Option<(f32, usize)> = None;
-        for offset in OFFSETS {
-            let cube = at.floor() + Vec3::from(offset.map(|c| c as f32));
-            let distance = (cube + 0.5 - at - normal).length_squared();
-            if best.is_none_or(|(d, _)| distance < d)
-                && let Some(node) = self.label(cube)
-            {
-                best = Some((distance, node));
+        [1.0, 2.0].into_iter().find_map(|scale| {
+            let mut best: Option<(f32, usize)> = None;
+            for offset in OFFSETS {
+                let cube = at.floor() + Vec3::from(offset.map(|c| c as f32)) * scale;
+                let distance = (cube + 0.5 - at - normal).length_squared();
+                if best.is_none_or(|(d, _)| distance < d)
+                    && let Some(node) = self.label(cube)
+                {
+                    best = Some((distance, node));
+                }
             }
-        }
-        best.map(|(_, node)| node)
+            best.map(|(_, node)| node)
+        })
     }
 }
 
-/// Distance to and number of the nearest node for every cube; the largest numbers where there is none. Dijkstra's algorithm with a ring of
-/// lists, one for each distance that may be open (Dial 1969).
+/// Distance to and number of the nearest node for every empty cube; the largest numbers where there is none.
 fn spread(grid: &VoxelGrid, nodes: &[usize]) -> (Vec<u32>, Vec<u32>) {
     let mut distances = vec![u32::MAX; grid.len()];
     let mut labels = vec![u32::MAX; grid.len()];
-    let steps: Vec<(isize, u32)> = grid.steps().into_iter().zip(OFFSETS.map(step_length)).collect();
-    let mut lists: [Vec<usize>; LONGEST + 1] = Default::default();
+    let mut seeds = Vec::new();
     for (&i, k) in nodes.iter().zip(0..) {
         if !grid.solid[i] {
             (distances[i], labels[i]) = (0, k);
-            lists[0].push(i);
+            seeds.push(i);
         }
     }
-    let mut open = lists[0].len();
+    flow(grid, seeds, &mut distances, &mut labels, |i| !grid.solid[i]);
+    (distances, labels)
+}
+
+/// Gives the empty cubes that no node reaches (pockets behind a cushion, in a plant) to the node nearest to them through solid
+/// cubes. `labels` as [`spread`] leaves them.
+fn fill_pockets(grid: &VoxelGrid, labels: &mut [u32]) {
+    let reached: Vec<usize> = (0..grid.len()).filter(|&i| labels[i] != u32::MAX).collect();
+    let unreached = |labels: &[u32], i: usize| labels[i] == u32::MAX;
+    if !(0..grid.len()).any(|i| !grid.solid[i] && unreached(labels, i)) {
+        return;
+    }
+    let mut distances = vec![u32::MAX; grid.len()];
+    for &i in &reached {
+        distances[i] = 0;
+    }
+    flow(grid, reached, &mut distances, labels, |i| !grid.is_rim(grid.place(i)));
+    for (label, _) in labels.iter_mut().zip(&grid.solid).filter(|(_, solid)| **solid) {
+        *label = u32::MAX;
+    }
+}
+
+/// Lets labels flow from the `seeds`, whose distance is zero, through the cubes that are `open`. Dijkstra's algorithm with a ring of
+/// lists, one for each distance that may be waiting (Dial 1969).
+fn flow(grid: &VoxelGrid, seeds: Vec<usize>, distances: &mut [u32], labels: &mut [u32], open: impl Fn(usize) -> bool) {
+    let steps: Vec<(isize, u32)> = grid.steps().into_iter().zip(OFFSETS.map(step_length)).collect();
+    let mut waiting = seeds.len();
+    let mut lists: [Vec<usize>; LONGEST + 1] = Default::default();
+    lists[0] = seeds;
     let mut distance = 0;
-    while open > 0 {
+    while waiting > 0 {
         let list = std::mem::take(&mut lists[distance as usize % (LONGEST + 1)]);
-        open -= list.len();
+        waiting -= list.len();
         for i in list {
             // Settled nearer already.
             if distances[i] != distance {
@@ -127,13 +158,13 @@ fn spread(grid: &VoxelGrid, nodes: &[usize]) -> (Vec<u32>, Vec<u32>) {
             for &(step, length) in &steps {
                 let n = i.wrapping_add_signed(step);
                 let offer = distance + length;
-                if grid.solid[n] || offer > distances[n] {
+                if offer > distances[n] || !open(n) {
                     continue;
                 }
                 if offer < distances[n] {
                     (distances[n], labels[n]) = (offer, labels[i]);
                     lists[offer as usize % (LONGEST + 1)].push(n);
-                    open += 1;
+                    waiting += 1;
                 } else {
                     // Every cube that is nearer to a node has its final label by now: lengths are positive.
                     labels[n] = labels[n].min(labels[i]);
@@ -142,7 +173,6 @@ fn spread(grid: &VoxelGrid, nodes: &[usize]) -> (Vec<u32>, Vec<u32>) {
         }
         distance += 1;
     }
-    (distances, labels)
 }
 
 #[cfg(test)]
@@ -189,6 +219,17 @@ mod tests {
                     assert_eq!(labels[i], u32::MAX);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn pockets_take_the_node_of_their_neighbours() {
+        // A node in the large room; the small one beyond the wall, and a crack in the far wall, have none.
+        let grid = VoxelGrid::of([20, 9, 9], |[x, y, _]| x == 12 || (x > 15 && !(x == 17 && y == 4)));
+        let map = NodeMap::new(&grid, &[grid.index([5, 4, 4])]);
+        for i in (0..grid.len()).filter(|&i| !grid.is_rim(grid.place(i))) {
+            let node = map.label(Vec3::from(grid.place(i).map(|c| c as f32)));
+            assert_eq!(node, (!grid.solid[i]).then_some(0));
         }
     }
 

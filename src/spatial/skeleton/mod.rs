@@ -119,7 +119,9 @@ mod tests {
 
     #[test]
     fn no_empty_space_is_an_empty_skeleton() {
-        for skeleton in [Skeleton::of(&Geometry::default(), 120), Skeleton::of_grid(&VoxelGrid::of([8, 8, 8], |_| true))] {
+        for skeleton in
+            [Skeleton::of(&Geometry::default(), 120), Skeleton::of_grid(&VoxelGrid::of([8, 8, 8], |_| true))]
+        {
             assert!(skeleton.nodes.is_empty() && skeleton.edges.is_empty());
             assert_eq!(skeleton.node_of(Vec3::ZERO, Vec3::Z), None);
         }

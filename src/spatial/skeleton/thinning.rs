@@ -174,7 +174,11 @@ mod tests {
                         let at: [isize; 3] = std::array::from_fn(|c| grid.place(i)[c] as isize + offset[c]);
                         let inside = (0..3).all(|c| at[c] >= 0 && at[c] < grid.dims[c] as isize);
                         let n = grid.index(at.map(|c| c as usize % 1000));
-                        if inside && offset.iter().map(|c| c.abs() as i64).sum::<i64>() <= axes && object[n] == of && !seen[n] {
+                        if inside
+                            && offset.iter().map(|c| c.abs() as i64).sum::<i64>() <= axes
+                            && object[n] == of
+                            && !seen[n]
+                        {
                             seen[n] = true;
                             stack.push(n);
                         }
@@ -287,7 +291,8 @@ mod tests {
     fn the_number_of_threads_changes_nothing() {
         let grid = VoxelGrid::of([50, 40, 30], |at| torus(at, [24.0, 20.0, 15.0], [0, 2, 1], [11.0, 4.0]));
         let squared = squared_distances(&grid);
-        let with = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(|| curves(&grid, &squared));
+        let with =
+            |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(|| curves(&grid, &squared));
         assert_eq!(with(1), with(3));
     }
 
