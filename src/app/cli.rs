@@ -3,7 +3,6 @@
 use super::measure_args::{BenchArgs, ConvergeArgs, MergeArgs, ProfileArgs};
 use crate::ray::Backend;
 use crate::render::ErrorTarget;
-use crate::spatial::skeleton::DEFAULT_CELLS;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -182,9 +181,9 @@ pub(crate) struct InfoArgs {
     /// Draw the skeleton over the camera's view: .png, .exr or .pfm
     #[arg(long, value_name = "FILE")]
     pub skeleton_image: Option<PathBuf>,
-    /// Cubes along the longest side of the scene from which the skeleton is made
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_CELLS as u32, value_parser = clap::value_parser!(u32).range(8..=512))]
-    pub skeleton_cells: u32,
+    /// Cubes along the longest side of the scene from which the skeleton is made [default: 120, and up to 240 for flat scenes]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=512))]
+    pub skeleton_cells: Option<u32>,
 }
 
 #[derive(Debug, Args)]

@@ -35,9 +35,10 @@ pub struct NodeMap {
 }
 
 impl NodeMap {
-    /// Spreads the nodes, which stand in the cubes `nodes`, through the empty cubes of `grid`.
-    pub fn new(grid: &VoxelGrid, nodes: &[usize]) -> NodeMap {
-        let (_, mut labels) = spread(grid, nodes);
+    /// Spreads the nodes, which stand in the cubes `nodes`, through the empty cubes of `space`, and then to all other empty cubes of
+    /// `grid`, the same or a grid with more of them.
+    pub fn new(grid: &VoxelGrid, space: &VoxelGrid, nodes: &[usize]) -> NodeMap {
+        let (_, mut labels) = spread(space, nodes);
         fill_pockets(grid, &mut labels);
         let labels = if nodes.len() < usize::from(u16::MAX) {
             Labels::Short(labels.into_iter().map(|k| u16::try_from(k).unwrap_or(u16::MAX)).collect())
@@ -226,7 +227,7 @@ mod tests {
     fn pockets_take_the_node_of_their_neighbours() {
         // A node in the large room; the small one beyond the wall, and a crack in the far wall, have none.
         let grid = VoxelGrid::of([20, 9, 9], |[x, y, _]| x == 12 || (x > 15 && !(x == 17 && y == 4)));
-        let map = NodeMap::new(&grid, &[grid.index([5, 4, 4])]);
+        let map = NodeMap::new(&grid, &grid, &[grid.index([5, 4, 4])]);
         for i in (0..grid.len()).filter(|&i| !grid.is_rim(grid.place(i))) {
             let node = map.label(Vec3::from(grid.place(i).map(|c| c as f32)));
             assert_eq!(node, (!grid.solid[i]).then_some(0));
@@ -238,7 +239,7 @@ mod tests {
         // A wall two cubes thick between two rooms.
         let grid = VoxelGrid::of([24, 12, 12], |[x, ..]| x == 11 || x == 12);
         let nodes = [grid.index([5, 5, 5]), grid.index([18, 5, 5])];
-        let map = NodeMap::new(&grid, &nodes);
+        let map = NodeMap::new(&grid, &grid, &nodes);
         let wall = |x: f32, nx: f32| map.node_of(Vec3::new(x, 6.0, 6.0), Vec3::X * nx);
         assert_eq!((wall(11.5, -1.0), wall(12.5, 1.0)), (Some(0), Some(1)));
         // Seen from the far surface, the way out is longer.

@@ -2,7 +2,7 @@
 //!
 //! What is seen from a node is much like what is seen from the surfaces around it, so that knowledge about visibility can be kept
 //! at nodes and shared by all points that belong to them (Noël and Biri 2015). The way there: [`voxels`] makes the scene
-//! solid cubes, [`distance`] says how far each empty cube is from them, [`thinning`] leaves curves, [`graph`] leaves few nodes,
+//! solid cubes, [`visited`] closes parts that nobody sees, [`distance`] says how far each empty cube is from them, [`thinning`] leaves curves, [`graph`] leaves few nodes,
 //! [`map`] tells every empty cube its node.
 
 pub mod distance;
@@ -11,15 +11,17 @@ pub mod graph;
 pub mod map;
 pub mod simple;
 pub mod thinning;
+pub mod visited;
 pub mod voxels;
 
 pub use voxels::VoxelGrid;
 
 use crate::math::Vec3;
+use crate::prepared::PreparedScene;
 use crate::ray::Geometry;
 use map::NodeMap;
 
-/// Cubes along the longest side of a scene, unless told otherwise.
+/// Cubes along the longest side of a scene, unless told otherwise; see also [`VoxelGrid::suggested_cells`].
 pub const DEFAULT_CELLS: usize = 120;
 
 /// A place in the middle of empty space.
@@ -44,18 +46,25 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
-    /// The skeleton of what `geometry` leaves empty, at a resolution of `cells` cubes along its longest side. Empty if there is nothing, or
-    /// nothing empty. The same for any number of threads.
-    pub fn of(geometry: &Geometry, cells: usize) -> Skeleton {
-        Skeleton::of_grid(&VoxelGrid::of_geometry(geometry, cells))
+    /// The skeleton of the empty space of `scene`, at a resolution of `cells` cubes along its longest side: of the parts that hold the
+    /// camera, what it sees, or a light. Empty if there is nothing, or nothing empty. The same for any number of threads.
+    pub fn of_scene(scene: &PreparedScene, cells: usize) -> Skeleton {
+        Skeleton::of_grid(&VoxelGrid::of_geometry(&scene.geometry, cells), &visited::places(scene))
     }
 
-    /// The skeleton of the empty cubes of `grid`, whose outermost layer must be solid.
-    pub fn of_grid(grid: &VoxelGrid) -> Skeleton {
-        let squared = distance::squared_distances(grid);
-        let curve = thinning::curves(grid, &squared);
-        let graph = graph::filtered(grid, &squared, &curve);
-        let map = NodeMap::new(grid, &graph.cubes);
+    /// The skeleton of all that `geometry` leaves empty, cavities included.
+    pub fn of(geometry: &Geometry, cells: usize) -> Skeleton {
+        Skeleton::of_grid(&VoxelGrid::of_geometry(geometry, cells), &[])
+    }
+
+    /// The skeleton of the empty cubes of `grid`, whose outermost layer must be solid: of the parts that hold one of `places`, or of
+    /// all if none does.
+    pub fn of_grid(grid: &VoxelGrid, places: &[visited::Place]) -> Skeleton {
+        let space = visited::closed_off(grid, places);
+        let squared = distance::squared_distances(&space);
+        let curve = thinning::curves(&space, &squared);
+        let graph = graph::filtered(&space, &squared, &curve);
+        let map = NodeMap::new(grid, &space, &graph.cubes);
         Skeleton { nodes: graph.nodes, edges: graph.edges, unfiltered: curve.len(), map }
     }
 
@@ -90,7 +99,7 @@ mod tests {
     #[test]
     fn two_rooms_have_two_skeletons_and_every_empty_cube_a_node_of_its_own() {
         let grid = VoxelGrid::of([40, 16, 13], |[x, y, _]| x == 20 || (x < 20 && y == 8 && x != 6));
-        let skeleton = Skeleton::of_grid(&grid);
+        let skeleton = Skeleton::of_grid(&grid, &[]);
         for i in (0..grid.len()).filter(|&i| !grid.solid[i]) {
             let node = skeleton.node_of(grid.centre(i), Vec3::ZERO).unwrap();
             assert_eq!(grid.centre(i).x < 20.0, skeleton.nodes[node].position.x < 20.0);
@@ -103,6 +112,26 @@ mod tests {
     }
 
     #[test]
+    fn a_room_that_nobody_visits_has_no_nodes_and_takes_those_nearby() {
+        let grid = VoxelGrid::of([40, 16, 13], |[x, ..]| x == 20);
+        let skeleton = Skeleton::of_grid(&grid, &[(Vec3::splat(6.0), Vec3::ZERO)]);
+        assert!(!skeleton.nodes.is_empty() && skeleton.nodes.iter().all(|n| n.position.x < 20.0));
+        for i in (0..grid.len()).filter(|&i| !grid.solid[i]) {
+            assert!(skeleton.node_of(grid.centre(i), Vec3::ZERO).is_some());
+        }
+    }
+
+    #[test]
+    fn the_number_of_threads_changes_nothing() {
+        let grid = VoxelGrid::of([40, 30, 25], |[x, y, z]| (x * 7 + y * 5 + z * 3) % 41 == 0 || (x == 20 && y > 4));
+        let with = |n| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+            format!("{:?}", pool.install(|| Skeleton::of_grid(&grid, &[])))
+        };
+        assert!(with(1) == with(3));
+    }
+
+    #[test]
     fn every_empty_cube_has_a_node_whatever_the_scene() {
         for seed in 0..6 {
             let mut rng = HashRng::new(seed, 0, 0, 0);
@@ -110,7 +139,7 @@ mod tests {
             let share = [0.003, 0.5, 0.7][seed as usize % 3];
             let random: Vec<bool> = (0..20 * 21 * 22).map(|_| rng.next_f32() < share).collect();
             let grid = VoxelGrid::of([20, 21, 22], |[x, y, z]| random[x + 20 * (y + 21 * z)]);
-            let skeleton = Skeleton::of_grid(&grid);
+            let skeleton = Skeleton::of_grid(&grid, &[]);
             for i in (0..grid.len()).filter(|&i| !grid.solid[i]) {
                 assert!(skeleton.node_of(grid.centre(i), Vec3::ZERO).is_some_and(|n| n < skeleton.nodes.len()));
             }
@@ -120,7 +149,7 @@ mod tests {
     #[test]
     fn no_empty_space_is_an_empty_skeleton() {
         for skeleton in
-            [Skeleton::of(&Geometry::default(), 120), Skeleton::of_grid(&VoxelGrid::of([8, 8, 8], |_| true))]
+            [Skeleton::of(&Geometry::default(), 120), Skeleton::of_grid(&VoxelGrid::of([8, 8, 8], |_| true), &[])]
         {
             assert!(skeleton.nodes.is_empty() && skeleton.edges.is_empty());
             assert_eq!(skeleton.node_of(Vec3::ZERO, Vec3::Z), None);

@@ -67,6 +67,16 @@ impl VoxelGrid {
         grid
     }
 
+    /// A good number of `cells` for [`VoxelGrid::of_geometry`]: `base`, or more where the scene is flat, as far as the grid then still is no
+    /// larger than `base`³ / 2 cubes and `2 · base` long. Rooms on a wide ground would be a few cubes high otherwise.
+    pub fn suggested_cells(geometry: &Geometry, base: usize) -> usize {
+        let Some((lo, hi)) = geometry.bounds() else { return base };
+        let fits = |cells: usize| {
+            frame(lo, hi, cells).is_some_and(|g| g.dims.iter().product::<usize>() <= base * base * base / 2)
+        };
+        (base..=2 * base).step_by((base / 20).max(1)).take_while(|&c| c == base || fits(c)).last().unwrap_or(base)
+    }
+
     /// Cubes in all.
     pub fn len(&self) -> usize {
         self.solid.len()
@@ -293,6 +303,13 @@ mod tests {
         assert_eq!(grid.dims, [122, 3, 3]);
         let grid = frame(Vec3::ZERO, Vec3::ONE, 120).unwrap();
         assert!(grid.dims.iter().product::<usize>() * 2 <= 3_000_000);
+        let flat = |h: f32| {
+            let positions = VertexBuffer::new(vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, h, 1.0)]);
+            let mesh = MeshBuffers { positions, triangles: vec![[0, 1, 2]] };
+            VoxelGrid::suggested_cells(&Geometry { meshes: vec![mesh], world: vec![0], ..Geometry::default() }, 120)
+        };
+        assert_eq!((flat(1.0), flat(0.5), flat(0.001)), (120, 120, 240));
+        assert!((150..240).contains(&flat(0.15)), "{}", flat(0.15));
         assert!(frame(Vec3::ZERO, Vec3::ZERO, 120).is_none());
         assert!(frame(Vec3::ZERO, Vec3::splat(f32::INFINITY), 120).is_none());
         assert!(frame(Vec3::ZERO, Vec3::splat(1e30), 0).is_some_and(|g| g.dims.iter().all(|&d| d <= 7)));

@@ -1,0 +1,87 @@
+//! Which parts of empty space matter: those that hold the camera, what it sees, or a light.
+//!
+//! Walls, columns and cupboards of real scenes are hollow, and cavities may be larger than rooms together; as closed parts of empty space
+//! they would have more nodes than the rooms. Paths hardly ever get there. Where one does after all (through glass, through a gap
+//! finer than a cube), its points belong to the nearest node elsewhere.
+
+use super::voxels::VoxelGrid;
+use crate::emit::Light;
+use crate::math::Vec3;
+use crate::prepared::PreparedScene;
+use crate::ray::Ray;
+
+/// Columns and rows of rays that look at the scene.
+const VIEW: [u32; 2] = [48, 32];
+/// How far from a surface its part of space is looked for, in cubes.
+const STEPS_OFF: [f32; 2] = [0.75, 1.5];
+
+/// A point, and the unit normal on the side that matters; zero for a point in the air.
+pub type Place = (Vec3, Vec3);
+
+/// The camera, what it sees first, and all lights that are in the scene.
+pub fn places(scene: &PreparedScene) -> Vec<Place> {
+    let mut places = vec![(scene.camera.position(), Vec3::ZERO)];
+    for (x, y) in (0..VIEW[1]).flat_map(|y| (0..VIEW[0]).map(move |x| (x, y))) {
+        let share = [x as f32 / VIEW[0] as f32, y as f32 / VIEW[1] as f32];
+        let raster = [0, 1].map(|c| scene.film_size[c] as f32 * share[c] + 0.5);
+        let eye = scene.camera.sample_ray(raster, [0.5; 2]);
+        let ray = Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far };
+        if let Some(hit) = ray.is_valid().then(|| scene.query.closest(&ray)).flatten() {
+            let (point, _) = scene.surface_point(&hit);
+            places.push((point.p, if point.ng.dot(ray.d) > 0.0 { -point.ng } else { point.ng }));
+        }
+    }
+    places.extend(scene.lights.iter().filter_map(|(_, light)| match light {
+        Light::Triangle(l) => Some((l.corners().into_iter().sum::<Vec3>() / 3.0, l.ng())),
+        Light::Point(l) => Some((l.position(), Vec3::ZERO)),
+        Light::Spot(l) => Some((l.position(), Vec3::ZERO)),
+        Light::Directional(_) | Light::Environment(_) => None,
+    }));
+    places
+}
+
+/// `grid` with everything solid that does not hang together with a place; unchanged if no place is in empty space.
+pub fn closed_off(grid: &VoxelGrid, places: &[Place]) -> VoxelGrid {
+    let mut space = VoxelGrid { solid: vec![true; grid.len()], ..grid.clone() };
+    let mut stack = Vec::new();
+    for &(p, normal) in places {
+        let cubes = STEPS_OFF.iter().filter_map(|s| grid.cell_of(p + normal * (s * grid.cell)));
+        if let Some(i) = cubes.into_iter().find(|&i| !grid.solid[i]) {
+            space.solid[i] = false;
+            stack.push(i);
+        }
+    }
+    if stack.is_empty() {
+        return grid.clone();
+    }
+    let steps = grid.steps();
+    while let Some(i) = stack.pop() {
+        for step in steps {
+            let n = i.wrapping_add_signed(step);
+            if space.solid[n] && !grid.solid[n] {
+                space.solid[n] = false;
+                stack.push(n);
+            }
+        }
+    }
+    space
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_parts_with_a_place_stay_open() {
+        // Three rooms; the light is on the wall of the last.
+        let grid = VoxelGrid::of([31, 9, 9], |[x, ..]| x == 10 || x == 20);
+        let open = |places: &[Place]| {
+            let space = closed_off(&grid, places);
+            [5, 15, 25].map(|x| !space.solid[grid.index([x, 4, 4])])
+        };
+        let (eye, light) = ((Vec3::splat(4.5), Vec3::ZERO), (Vec3::new(20.5, 4.5, 4.5), Vec3::X));
+        assert_eq!(open(&[eye]), [true, false, false]);
+        assert_eq!(open(&[eye, light]), [true, false, true]);
+        assert_eq!(open(&[(Vec3::splat(-9.0), Vec3::X), (Vec3::NAN, Vec3::X)]), [true; 3]);
+    }
+}
