@@ -4,8 +4,9 @@
 //! removed is the nearest node that stays, along the curves; so the graph of those that stay hangs together where the curves do.
 //!
 //! Two things are added to the paper's filter, since walls have insides and grids have an end. A ball is taken to be at least two cubes
-//! wide, so that a gap of one cube does not have a node in every cube; such a ball clears neighbours only. And curves that are nowhere
-//! in a space wider than two cubes are left out: they are cavities of walls.
+//! wide, so that a gap of one cube does not have a node in every cube; such a ball clears neighbours only. And curves in spaces no wider
+//! than two cubes are left out unless they join what nothing else joins: they run between the shells of walls and through every lattice.
+//! The graph thus keeps pieces together, but not all of the loops that thinning keeps.
 
 use super::Node;
 use super::thinning::WIDE;
@@ -29,7 +30,7 @@ pub struct Graph {
 
 /// Filters `curve`, cubes in ascending order; `squared` as for thinning.
 pub fn filtered(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Graph {
-    let curve = &wide(grid, squared, curve);
+    let curve = &worthwhile(grid, squared, curve);
     let mut order = curve.clone();
     order.sort_by_key(|&i| (Reverse(squared[i]), i));
     let stay = survivors(grid, squared, &order);
@@ -38,29 +39,82 @@ pub fn filtered(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Graph {
     Graph { nodes: stay.iter().map(node).collect(), edges, cubes: stay }
 }
 
-/// The cubes of those curves that are [`WIDE`] somewhere; all of them if none is.
-fn wide(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<usize> {
-    let mut reached = vec![true; grid.len()];
+/// Cubes that hang together and are all wide, or all narrow.
+struct Stretch {
+    wide: bool,
+    cubes: Vec<usize>,
+    /// Stretches of the other kind that it touches.
+    touches: Vec<usize>,
+}
+
+/// Cuts curves where they become wide ([`WIDE`]) or narrow.
+fn stretches(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<Stretch> {
+    const NOBODY: usize = usize::MAX;
+    let mut on_curve = vec![false; grid.len()];
     for &i in curve {
-        reached[i] = false;
+        on_curve[i] = true;
     }
-    let mut stack: Vec<usize> = curve.iter().copied().filter(|&i| squared[i] >= WIDE).collect();
-    if stack.is_empty() {
-        return curve.to_vec();
-    }
-    for &i in &stack {
-        reached[i] = true;
-    }
-    while let Some(i) = stack.pop() {
-        for step in grid.steps() {
-            let n = i.wrapping_add_signed(step);
-            if !reached[n] {
-                reached[n] = true;
-                stack.push(n);
+    let is_wide = |i: usize| squared[i] >= WIDE;
+    let steps = grid.steps();
+    let near = |i: usize| steps.iter().map(move |s| i.wrapping_add_signed(*s));
+    let mut number = vec![NOBODY; grid.len()];
+    let mut found: Vec<Stretch> = Vec::new();
+    for &start in curve {
+        if number[start] != NOBODY {
+            continue;
+        }
+        let (wide, mut cubes, mut done) = (is_wide(start), vec![start], 0);
+        number[start] = found.len();
+        while let Some(&i) = cubes.get(done) {
+            done += 1;
+            for n in near(i).filter(|&n| on_curve[n] && is_wide(n) == wide) {
+                if number[n] == NOBODY {
+                    number[n] = found.len();
+                    cubes.push(n);
+                }
             }
         }
+        found.push(Stretch { wide, cubes, touches: Vec::new() });
     }
-    curve.iter().copied().filter(|&i| reached[i]).collect()
+    for (k, stretch) in found.iter_mut().enumerate() {
+        let around = stretch.cubes.iter().flat_map(|&i| near(i)).filter(|&n| on_curve[n]).map(|n| number[n]);
+        stretch.touches = around.filter(|&n| n != k).collect();
+        stretch.touches.sort_unstable();
+        stretch.touches.dedup();
+    }
+    found
+}
+
+/// The cubes of wide stretches, and of those narrow ones that join wide ones, the short before the long. All if nothing is wide.
+fn worthwhile(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<usize> {
+    let stretches = stretches(grid, squared, curve);
+    if !stretches.iter().any(|s| s.wide) {
+        return curve.to_vec();
+    }
+    // What is joined has the same root.
+    let mut parent: Vec<usize> = (0..stretches.len()).collect();
+    let root = |parent: &[usize], mut k: usize| {
+        while parent[k] != k {
+            k = parent[k];
+        }
+        k
+    };
+    let mut narrow: Vec<&Stretch> = stretches.iter().filter(|s| !s.wide).collect();
+    narrow.sort_by_key(|s| s.cubes.len());
+    let mut stay: Vec<usize> = stretches.iter().filter(|s| s.wide).flat_map(|s| s.cubes.iter().copied()).collect();
+    for stretch in narrow {
+        let mut joined = false;
+        for pair in stretch.touches.windows(2) {
+            let (a, b) = (root(&parent, pair[0]), root(&parent, pair[1]));
+            joined |= a != b;
+            parent[a.max(b)] = a.min(b);
+        }
+        if joined {
+            stay.extend(&stretch.cubes);
+        }
+    }
+    stay.sort_unstable();
+    stay
 }
 
 /// The cubes of `order` that are in no ball of an earlier one that stays.
@@ -187,7 +241,7 @@ mod tests {
                     assert!(a.radius >= b.radius && distance(a.position, b.position) >= a.radius.max(2.0) - 1e-4);
                 }
             }
-            for &i in &curve {
+            for &i in &worthwhile(&grid, &squared, &curve) {
                 let p = grid.centre(i);
                 let node = |n: &Node| {
                     distance(n.position, p) < n.radius.max(2.0) && n.radius.powi(2) > squared[i] as f32 - 1e-2
@@ -204,5 +258,25 @@ mod tests {
         let (graph, ..) = graph_of(&grid);
         assert_eq!(pieces(graph.nodes.len(), &graph.edges), 1);
         assert_eq!(graph.nodes.len(), graph.edges.len(), "as many edges as nodes");
+    }
+
+    #[test]
+    fn of_two_narrow_passages_the_short_one_stays() {
+        // Rooms beside each other; holes in the wall between them at y = 5 and, with a way round a corner, at y = 15.
+        let solid = |[x, y, z]: [usize; 3]| {
+            let passage = z == 5 && ((y == 5 && (9..12).contains(&x)) || (y == 15 && (9..16).contains(&x)));
+            let wall = (9..12).contains(&x) || ((12..16).contains(&x) && y > 10);
+            wall && !passage
+        };
+        let grid = VoxelGrid::of([26, 20, 11], solid);
+        let (graph, curve, _) = graph_of(&grid);
+        let has = |y: usize| curve.contains(&grid.index([10, y, 5]));
+        assert!(has(5) && has(15), "a loop");
+        assert_eq!(pieces(graph.nodes.len(), &graph.edges), 1);
+        let crossing = |y: f32| {
+            let near = |n: &&Node| (9.0..12.0).contains(&n.position.x) && (n.position.y - y).abs() < 1.0;
+            graph.nodes.iter().filter(near).count()
+        };
+        assert!(crossing(5.5) > 0 && crossing(15.5) == 0);
     }
 }
