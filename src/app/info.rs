@@ -8,7 +8,7 @@ use crate::image::{OutputFormat, Pixels};
 use crate::integrators;
 use crate::prepared::{PrepareOptions, PreparedScene};
 use crate::ray::Backend;
-use crate::spatial::skeleton::{DEFAULT_CELLS, Skeleton, VoxelGrid};
+use crate::spatial::Skeleton;
 use std::time::Instant;
 
 fn mib(bytes: usize) -> String {
@@ -77,9 +77,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
 
 fn write_skeleton(args: &InfoArgs, scene: &PreparedScene) -> Result<(), Failure> {
     let start = Instant::now();
-    let suggested = || VoxelGrid::suggested_cells(&scene.geometry, DEFAULT_CELLS);
-    let cells = args.skeleton_cells.map_or_else(suggested, |c| c as usize);
-    let made = Skeleton::of_scene(scene, cells);
+    let made = Skeleton::of_scene(scene, args.skeleton_cells.map(|c| c as usize));
     let seconds = start.elapsed().as_secs_f64();
     let ([w, h, d], _) = made.resolution();
     out!(

@@ -46,10 +46,15 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
-    /// The skeleton of the empty space of `scene`, at a resolution of `cells` cubes along its longest side: of the parts that hold the
-    /// camera, what it sees, or a light. Empty if there is nothing, or nothing empty. The same for any number of threads.
-    pub fn of_scene(scene: &PreparedScene, cells: usize) -> Skeleton {
-        Skeleton::of_grid(&VoxelGrid::of_geometry(&scene.geometry, cells), &visited::places(scene))
+    /// The skeleton of the empty space of `scene`: of the parts that hold the camera, what it sees, or a light, and without far
+    /// surroundings ([`visited`]). `cells`: cubes along the longest side; if not given, [`DEFAULT_CELLS`], or more for flat scenes
+    /// ([`VoxelGrid::suggested_cells`]). Empty if there is nothing, or nothing empty. The same for any number of threads.
+    pub fn of_scene(scene: &PreparedScene, cells: Option<usize>) -> Skeleton {
+        let places = visited::places(scene);
+        let Some(bounds) = scene.geometry.bounds() else { return Skeleton::of(&scene.geometry, DEFAULT_CELLS) };
+        let region = visited::region(bounds, &places);
+        let cells = cells.unwrap_or_else(|| VoxelGrid::suggested_cells(region, DEFAULT_CELLS));
+        Skeleton::of_grid(&VoxelGrid::of_region(&scene.geometry, region, cells), &places)
     }
 
     /// The skeleton of all that `geometry` leaves empty, cavities included.

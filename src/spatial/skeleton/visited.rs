@@ -1,5 +1,8 @@
 //! Which parts of empty space matter: those that hold the camera, what it sees, or a light.
 //!
+//! A house may stand on a wide ground, on which most cubes of a grid would be wasted: the grid ends not far beyond what is seen. Points
+//! outside of it have no node.
+//!
 //! Walls, columns and cupboards of real scenes are hollow, and cavities may be larger than rooms together; as closed parts of empty space
 //! they would have more nodes than the rooms. Paths hardly ever get there. Where one does after all (through glass, through a gap
 //! finer than a cube), its points belong to the nearest node elsewhere.
@@ -14,6 +17,11 @@ use crate::ray::Ray;
 const VIEW: [u32; 2] = [48, 32];
 /// How far from a surface its part of space is looked for, in cubes.
 const STEPS_OFF: [f32; 2] = [0.75, 1.5];
+
+/// Share of the places that may be further out than the rest, on each side.
+const OUTLIERS: f32 = 0.03;
+/// A region is used if it is shorter than this share of the scene.
+const MUCH_SMALLER: f32 = 0.7;
 
 /// A point, and the unit normal on the side that matters; zero for a point in the air.
 pub type Place = (Vec3, Vec3);
@@ -38,6 +46,27 @@ pub fn places(scene: &PreparedScene) -> Vec<Place> {
         Light::Directional(_) | Light::Environment(_) => None,
     }));
     places
+}
+
+/// The part of the box `bounds` that a grid should cover: what most of the places are in and as much again on each side, or all if that
+/// is not much smaller.
+pub fn region(bounds: (Vec3, Vec3), places: &[Place]) -> (Vec3, Vec3) {
+    let (lo, hi) = bounds;
+    let mut core = (Vec3::ZERO, Vec3::ZERO);
+    for axis in 0..3 {
+        let mut sorted: Vec<f32> =
+            places.iter().map(|(p, _)| p[axis]).filter(|c| (lo[axis]..=hi[axis]).contains(c)).collect();
+        sorted.sort_by(f32::total_cmp);
+        // What is seen through a window can be anywhere.
+        let few = (sorted.len() as f32 * OUTLIERS) as usize;
+        let (Some(first), Some(last)) = (sorted.get(few), sorted.iter().rev().nth(few)) else { return bounds };
+        (core.0[axis], core.1[axis]) = (*first, *last);
+    }
+    let size = core.1 - core.0;
+    let more = size.max(Vec3::splat(0.5 * size.max_element()));
+    let part = ((core.0 - more).max(lo), (core.1 + more).min(hi));
+    let longest = |(lo, hi): (Vec3, Vec3)| (hi - lo).max_element();
+    if longest(part) < MUCH_SMALLER * longest(bounds) { part } else { bounds }
 }
 
 /// `grid` with everything solid that does not hang together with a place; unchanged if no place is in empty space.
@@ -70,6 +99,19 @@ pub fn closed_off(grid: &VoxelGrid, places: &[Place]) -> VoxelGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_region_leaves_far_ground_out_but_no_part_of_a_room() {
+        let bounds = (Vec3::splat(-30.0), Vec3::splat(30.0));
+        let place = |x: f32, y: f32| (Vec3::new(x, y, 0.0), Vec3::ZERO);
+        let mut places: Vec<Place> = (0..100).map(|k| place(0.04 * k as f32, 2.0)).collect();
+        places.push(place(29.0, -29.0));
+        let (lo, hi) = region(bounds, &places);
+        assert!(lo.x < -3.0 && lo.x > -5.0 && hi.x > 7.0 && hi.x < 9.0, "{lo} {hi}");
+        assert!(lo.y <= 0.5 && hi.y >= 3.5, "{lo} {hi}");
+        assert_eq!(region((Vec3::ZERO, Vec3::splat(6.0)), &places), (Vec3::ZERO, Vec3::splat(6.0)));
+        assert_eq!(region(bounds, &[]), bounds);
+    }
 
     #[test]
     fn only_parts_with_a_place_stay_open() {

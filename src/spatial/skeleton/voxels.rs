@@ -44,9 +44,12 @@ impl VoxelGrid {
     /// Voxelises everything that a ray can meet, with about `cells` cubes along the longest side; fewer where the grid would hold more
     /// than five sixths of `cells`³ cubes. No geometry gives a grid without cubes.
     pub fn of_geometry(geometry: &Geometry, cells: usize) -> VoxelGrid {
-        let Some(mut grid) = geometry.bounds().and_then(|(lo, hi)| frame(lo, hi, cells)) else {
-            return VoxelGrid::default();
-        };
+        geometry.bounds().map(|bounds| VoxelGrid::of_region(geometry, bounds, cells)).unwrap_or_default()
+    }
+
+    /// [`VoxelGrid::of_geometry`] for what is in the box from `lo` to `hi`.
+    pub fn of_region(geometry: &Geometry, (lo, hi): (Vec3, Vec3), cells: usize) -> VoxelGrid {
+        let Some(mut grid) = frame(lo, hi, cells) else { return VoxelGrid::default() };
         let count = grid.dims.iter().product();
         let marks: Vec<AtomicBool> = (0..count).map(|_| AtomicBool::new(false)).collect();
         geometry.for_each_placed(|mesh, _, to_world| {
@@ -67,10 +70,9 @@ impl VoxelGrid {
         grid
     }
 
-    /// A good number of `cells` for [`VoxelGrid::of_geometry`]: `base`, or more where the scene is flat, as far as the grid then still is no
-    /// larger than `base`³ / 2 cubes and `2 · base` long. Rooms on a wide ground would be a few cubes high otherwise.
-    pub fn suggested_cells(geometry: &Geometry, base: usize) -> usize {
-        let Some((lo, hi)) = geometry.bounds() else { return base };
+    /// A good number of `cells` for a box: `base`, or more where it is flat, as far as the grid then still is no larger than `base`³ / 2
+    /// cubes and `2 · base` long. Low buildings would be a few cubes high otherwise.
+    pub fn suggested_cells((lo, hi): (Vec3, Vec3), base: usize) -> usize {
         let fits = |cells: usize| {
             frame(lo, hi, cells).is_some_and(|g| g.dims.iter().product::<usize>() <= base * base * base / 2)
         };
@@ -303,11 +305,7 @@ mod tests {
         assert_eq!(grid.dims, [122, 3, 3]);
         let grid = frame(Vec3::ZERO, Vec3::ONE, 120).unwrap();
         assert!(grid.dims.iter().product::<usize>() * 2 <= 3_000_000);
-        let flat = |h: f32| {
-            let positions = VertexBuffer::new(vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, h, 1.0)]);
-            let mesh = MeshBuffers { positions, triangles: vec![[0, 1, 2]] };
-            VoxelGrid::suggested_cells(&Geometry { meshes: vec![mesh], world: vec![0], ..Geometry::default() }, 120)
-        };
+        let flat = |h: f32| VoxelGrid::suggested_cells((Vec3::ZERO, Vec3::new(1.0, h, 1.0)), 120);
         assert_eq!((flat(1.0), flat(0.5), flat(0.001)), (120, 120, 240));
         assert!((150..240).contains(&flat(0.15)), "{}", flat(0.15));
         assert!(frame(Vec3::ZERO, Vec3::ZERO, 120).is_none());
