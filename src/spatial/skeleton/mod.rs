@@ -54,7 +54,8 @@ impl Skeleton {
         let Some(bounds) = scene.geometry.bounds() else { return Skeleton::of(&scene.geometry, DEFAULT_CELLS) };
         let region = visited::region(bounds, &places);
         let cells = cells.unwrap_or_else(|| VoxelGrid::suggested_cells(region, DEFAULT_CELLS));
-        Skeleton::of_grid(&VoxelGrid::of_region(&scene.geometry, region, cells), &places)
+        let all = [places.ends, places.seen].concat();
+        Skeleton::of_grid(&VoxelGrid::of_region(&scene.geometry, region, cells), &all)
     }
 
     /// The skeleton of all that `geometry` leaves empty, cavities included.

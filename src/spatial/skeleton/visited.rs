@@ -18,17 +18,26 @@ const VIEW: [u32; 2] = [48, 32];
 /// How far from a surface its part of space is looked for, in cubes.
 const STEPS_OFF: [f32; 2] = [0.75, 1.5];
 
-/// Share of the places that may be further out than the rest, on each side.
+/// Share of what is seen that may be further out than the rest, on each side.
 const OUTLIERS: f32 = 0.03;
 /// A region is used if it is shorter than this share of the scene.
-const MUCH_SMALLER: f32 = 0.7;
+const MUCH_SMALLER: f32 = 0.6;
 
 /// A point, and the unit normal on the side that matters; zero for a point in the air.
 pub type Place = (Vec3, Vec3);
 
-/// The camera, what it sees first, and all lights that are in the scene.
-pub fn places(scene: &PreparedScene) -> Vec<Place> {
-    let mut places = vec![(scene.camera.position(), Vec3::ZERO)];
+/// Places that paths visit for sure.
+#[derive(Debug, Default)]
+pub struct Places {
+    /// The camera, and the lights that are in the scene.
+    pub ends: Vec<Place>,
+    /// What the camera sees first.
+    pub seen: Vec<Place>,
+}
+
+/// The places of a scene.
+pub fn places(scene: &PreparedScene) -> Places {
+    let mut seen = Vec::new();
     for (x, y) in (0..VIEW[1]).flat_map(|y| (0..VIEW[0]).map(move |x| (x, y))) {
         let share = [x as f32 / VIEW[0] as f32, y as f32 / VIEW[1] as f32];
         let raster = [0, 1].map(|c| scene.film_size[c] as f32 * share[c] + 0.5);
@@ -36,31 +45,35 @@ pub fn places(scene: &PreparedScene) -> Vec<Place> {
         let ray = Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far };
         if let Some(hit) = ray.is_valid().then(|| scene.query.closest(&ray)).flatten() {
             let (point, _) = scene.surface_point(&hit);
-            places.push((point.p, if point.ng.dot(ray.d) > 0.0 { -point.ng } else { point.ng }));
+            seen.push((point.p, if point.ng.dot(ray.d) > 0.0 { -point.ng } else { point.ng }));
         }
     }
-    places.extend(scene.lights.iter().filter_map(|(_, light)| match light {
+    let mut ends = vec![(scene.camera.position(), Vec3::ZERO)];
+    ends.extend(scene.lights.iter().filter_map(|(_, light)| match light {
         Light::Triangle(l) => Some((l.corners().into_iter().sum::<Vec3>() / 3.0, l.ng())),
         Light::Point(l) => Some((l.position(), Vec3::ZERO)),
         Light::Spot(l) => Some((l.position(), Vec3::ZERO)),
         Light::Directional(_) | Light::Environment(_) => None,
     }));
-    places
+    Places { ends, seen }
 }
 
-/// The part of the box `bounds` that a grid should cover: what most of the places are in and as much again on each side, or all if that
-/// is not much smaller.
-pub fn region(bounds: (Vec3, Vec3), places: &[Place]) -> (Vec3, Vec3) {
+/// The part of the box `bounds` that a grid should cover: where the ends are and most of what is seen, and as much again on each side;
+/// all if that is not much smaller.
+pub fn region(bounds: (Vec3, Vec3), places: &Places) -> (Vec3, Vec3) {
     let (lo, hi) = bounds;
-    let mut core = (Vec3::ZERO, Vec3::ZERO);
+    let mut core = (hi, lo);
     for axis in 0..3 {
-        let mut sorted: Vec<f32> =
-            places.iter().map(|(p, _)| p[axis]).filter(|c| (lo[axis]..=hi[axis]).contains(c)).collect();
+        let mut sorted: Vec<f32> = places.seen.iter().map(|(p, _)| p[axis]).collect();
         sorted.sort_by(f32::total_cmp);
         // What is seen through a window can be anywhere.
         let few = (sorted.len() as f32 * OUTLIERS) as usize;
         let (Some(first), Some(last)) = (sorted.get(few), sorted.iter().rev().nth(few)) else { return bounds };
         (core.0[axis], core.1[axis]) = (*first, *last);
+    }
+    for &(p, _) in &places.ends {
+        let p = p.clamp(lo, hi);
+        core = (core.0.min(p), core.1.max(p));
     }
     let size = core.1 - core.0;
     let more = size.max(Vec3::splat(0.5 * size.max_element()));
@@ -104,13 +117,16 @@ mod tests {
     fn a_region_leaves_far_ground_out_but_no_part_of_a_room() {
         let bounds = (Vec3::splat(-30.0), Vec3::splat(30.0));
         let place = |x: f32, y: f32| (Vec3::new(x, y, 0.0), Vec3::ZERO);
-        let mut places: Vec<Place> = (0..100).map(|k| place(0.04 * k as f32, 2.0)).collect();
-        places.push(place(29.0, -29.0));
+        let mut seen: Vec<Place> = (0..100).map(|k| place(0.04 * k as f32, 2.0)).collect();
+        seen.push(place(29.0, -29.0));
+        let places = Places { ends: vec![place(1.0, 1.0)], seen };
         let (lo, hi) = region(bounds, &places);
         assert!(lo.x < -3.0 && lo.x > -5.0 && hi.x > 7.0 && hi.x < 9.0, "{lo} {hi}");
-        assert!(lo.y <= 0.5 && hi.y >= 3.5, "{lo} {hi}");
+        assert!(lo.y <= -0.5 && hi.y >= 3.5, "{lo} {hi}");
         assert_eq!(region((Vec3::ZERO, Vec3::splat(6.0)), &places), (Vec3::ZERO, Vec3::splat(6.0)));
-        assert_eq!(region(bounds, &[]), bounds);
+        assert_eq!(region(bounds, &Places::default()), bounds);
+        // A light is never an outlier.
+        assert_eq!(region(bounds, &Places { ends: vec![place(25.0, -25.0)], ..places }), bounds);
     }
 
     #[test]
