@@ -15,8 +15,8 @@ use crate::ray::Ray;
 
 /// Columns and rows of rays that look at the scene.
 const VIEW: [u32; 2] = [48, 32];
-/// How far from a surface its part of space is looked for, in cubes.
-const STEPS_OFF: [f32; 2] = [0.75, 1.5];
+/// How far from a surface its part of space is looked for, in cubes: in the next one, never beyond a wall that is close.
+const STEP_OFF: f32 = 1.0;
 
 /// Share of what is seen that may be further out than the rest, on each side.
 const OUTLIERS: f32 = 0.03;
@@ -87,8 +87,7 @@ pub fn closed_off(grid: &VoxelGrid, places: &[Place]) -> VoxelGrid {
     let mut space = VoxelGrid { solid: vec![true; grid.len()], ..grid.clone() };
     let mut stack = Vec::new();
     for &(p, normal) in places {
-        let cubes = STEPS_OFF.iter().filter_map(|s| grid.cell_of(p + normal * (s * grid.cell)));
-        if let Some(i) = cubes.into_iter().find(|&i| !grid.solid[i]) {
+        if let Some(i) = grid.cell_of(p + normal * (STEP_OFF * grid.cell)).filter(|&i| !grid.solid[i]) {
             space.solid[i] = false;
             stack.push(i);
         }
