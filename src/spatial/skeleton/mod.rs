@@ -14,6 +14,7 @@ pub mod thinning;
 pub mod visited;
 pub mod voxels;
 
+pub use visited::Places;
 pub use voxels::VoxelGrid;
 
 use crate::math::Vec3;
@@ -54,18 +55,17 @@ impl Skeleton {
         let Some(bounds) = scene.geometry.bounds() else { return Skeleton::of(&scene.geometry, DEFAULT_CELLS) };
         let region = visited::region(bounds, &places);
         let cells = cells.unwrap_or_else(|| VoxelGrid::suggested_cells(region, DEFAULT_CELLS));
-        let all = [places.ends, places.seen].concat();
-        Skeleton::of_grid(&VoxelGrid::of_region(&scene.geometry, region, cells), &all)
+        Skeleton::of_grid(&VoxelGrid::of_region(&scene.geometry, region, cells), &places)
     }
 
     /// The skeleton of all that `geometry` leaves empty, cavities included.
     pub fn of(geometry: &Geometry, cells: usize) -> Skeleton {
-        Skeleton::of_grid(&VoxelGrid::of_geometry(geometry, cells), &[])
+        Skeleton::of_grid(&VoxelGrid::of_geometry(geometry, cells), &Places::default())
     }
 
     /// The skeleton of the empty cubes of `grid`, whose outermost layer must be solid: of the parts that hold one of `places`, or of
     /// all if none does.
-    pub fn of_grid(grid: &VoxelGrid, places: &[visited::Place]) -> Skeleton {
+    pub fn of_grid(grid: &VoxelGrid, places: &Places) -> Skeleton {
         let space = visited::closed_off(grid, places);
         let squared = distance::squared_distances(&space);
         let curve = thinning::curves(&space, &squared);
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn two_rooms_have_two_skeletons_and_every_empty_cube_a_node_of_its_own() {
         let grid = VoxelGrid::of([40, 16, 13], |[x, y, _]| x == 20 || (x < 20 && y == 8 && x != 6));
-        let skeleton = Skeleton::of_grid(&grid, &[]);
+        let skeleton = Skeleton::of_grid(&grid, &Places::default());
         for i in (0..grid.len()).filter(|&i| !grid.solid[i]) {
             let node = skeleton.node_of(grid.centre(i), Vec3::ZERO).unwrap();
             assert_eq!(grid.centre(i).x < 20.0, skeleton.nodes[node].position.x < 20.0);
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn a_room_that_nobody_visits_has_no_nodes_and_takes_those_nearby() {
         let grid = VoxelGrid::of([40, 16, 13], |[x, ..]| x == 20);
-        let skeleton = Skeleton::of_grid(&grid, &[(Vec3::splat(6.0), Vec3::ZERO)]);
+        let skeleton = Skeleton::of_grid(&grid, &Places { ends: vec![(Vec3::splat(6.0), Vec3::ZERO)], seen: vec![] });
         assert!(!skeleton.nodes.is_empty() && skeleton.nodes.iter().all(|n| n.position.x < 20.0));
         for i in (0..grid.len()).filter(|&i| !grid.solid[i]) {
             assert!(skeleton.node_of(grid.centre(i), Vec3::ZERO).is_some());
@@ -132,7 +132,7 @@ mod tests {
         let grid = VoxelGrid::of([40, 30, 25], |[x, y, z]| (x * 7 + y * 5 + z * 3) % 41 == 0 || (x == 20 && y > 4));
         let with = |n| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
-            format!("{:?}", pool.install(|| Skeleton::of_grid(&grid, &[])))
+            format!("{:?}", pool.install(|| Skeleton::of_grid(&grid, &Places::default())))
         };
         assert!(with(1) == with(3));
     }
@@ -145,7 +145,7 @@ mod tests {
             let share = [0.003, 0.5, 0.7][seed as usize % 3];
             let random: Vec<bool> = (0..20 * 21 * 22).map(|_| rng.next_f32() < share).collect();
             let grid = VoxelGrid::of([20, 21, 22], |[x, y, z]| random[x + 20 * (y + 21 * z)]);
-            let skeleton = Skeleton::of_grid(&grid, &[]);
+            let skeleton = Skeleton::of_grid(&grid, &Places::default());
             for i in (0..grid.len()).filter(|&i| !grid.solid[i]) {
                 assert!(skeleton.node_of(grid.centre(i), Vec3::ZERO).is_some_and(|n| n < skeleton.nodes.len()));
             }
@@ -154,9 +154,10 @@ mod tests {
 
     #[test]
     fn no_empty_space_is_an_empty_skeleton() {
-        for skeleton in
-            [Skeleton::of(&Geometry::default(), 120), Skeleton::of_grid(&VoxelGrid::of([8, 8, 8], |_| true), &[])]
-        {
+        for skeleton in [
+            Skeleton::of(&Geometry::default(), 120),
+            Skeleton::of_grid(&VoxelGrid::of([8, 8, 8], |_| true), &Places::default()),
+        ] {
             assert!(skeleton.nodes.is_empty() && skeleton.edges.is_empty());
             assert_eq!(skeleton.node_of(Vec3::ZERO, Vec3::Z), None);
         }

@@ -20,6 +20,8 @@ const STEP_OFF: f32 = 1.0;
 
 /// Share of what is seen that may be further out than the rest, on each side.
 const OUTLIERS: f32 = 0.03;
+/// Share of what is seen that makes a part of space count; less is seen through cracks.
+const FAIR: f32 = 0.005;
 /// A region is used if it is shorter than this share of the scene.
 const MUCH_SMALLER: f32 = 0.6;
 
@@ -82,20 +84,39 @@ pub fn region(bounds: (Vec3, Vec3), places: &Places) -> (Vec3, Vec3) {
     if longest(part) < MUCH_SMALLER * longest(bounds) { part } else { bounds }
 }
 
-/// `grid` with everything solid that does not hang together with a place; unchanged if no place is in empty space.
-pub fn closed_off(grid: &VoxelGrid, places: &[Place]) -> VoxelGrid {
+/// `grid` with everything solid that does not hang together with an end, or with a fair share of what is seen; unchanged if no place is
+/// in empty space.
+pub fn closed_off(grid: &VoxelGrid, places: &Places) -> VoxelGrid {
     let mut space = VoxelGrid { solid: vec![true; grid.len()], ..grid.clone() };
-    let mut stack = Vec::new();
-    for &(p, normal) in places {
-        if let Some(i) = grid.cell_of(p + normal * (STEP_OFF * grid.cell)).filter(|&i| !grid.solid[i]) {
-            space.solid[i] = false;
-            stack.push(i);
-        }
-    }
-    if stack.is_empty() {
+    let cube = |&(p, normal): &Place| grid.cell_of(p + normal * (STEP_OFF * grid.cell)).filter(|&i| !grid.solid[i]);
+    let mut seeds: Vec<usize> = places.ends.iter().filter_map(cube).collect();
+    flood(grid, &mut space, &seeds);
+    let mut seen: Vec<usize> = places.seen.iter().filter_map(cube).collect();
+    let enough = (seen.len() as f32 * FAIR) as usize;
+    seeds.extend(&seen);
+    if seeds.is_empty() {
         return grid.clone();
     }
+    seen.retain(|&i| space.solid[i]);
+    while let Some(&i) = seen.first() {
+        let mut part = space.clone();
+        flood(grid, &mut part, &[i]);
+        let before = seen.len();
+        seen.retain(|&i| part.solid[i]);
+        if before - seen.len() > enough {
+            space = part;
+        }
+    }
+    space
+}
+
+/// Opens in `space` what is empty in `grid` and hangs together with `seeds`.
+fn flood(grid: &VoxelGrid, space: &mut VoxelGrid, seeds: &[usize]) {
     let steps = grid.steps();
+    let mut stack = seeds.to_vec();
+    for &i in seeds {
+        space.solid[i] = false;
+    }
     while let Some(i) = stack.pop() {
         for step in steps {
             let n = i.wrapping_add_signed(step);
@@ -105,7 +126,6 @@ pub fn closed_off(grid: &VoxelGrid, places: &[Place]) -> VoxelGrid {
             }
         }
     }
-    space
 }
 
 #[cfg(test)]
@@ -132,13 +152,16 @@ mod tests {
     fn only_parts_with_a_place_stay_open() {
         // Three rooms; the light is on the wall of the last.
         let grid = VoxelGrid::of([31, 9, 9], |[x, ..]| x == 10 || x == 20);
-        let open = |places: &[Place]| {
-            let space = closed_off(&grid, places);
+        let open = |ends: &[Place], seen: &[Place]| {
+            let space = closed_off(&grid, &Places { ends: ends.to_vec(), seen: seen.to_vec() });
             [5, 15, 25].map(|x| !space.solid[grid.index([x, 4, 4])])
         };
         let (eye, light) = ((Vec3::splat(4.5), Vec3::ZERO), (Vec3::new(20.5, 4.5, 4.5), Vec3::X));
-        assert_eq!(open(&[eye]), [true, false, false]);
-        assert_eq!(open(&[eye, light]), [true, false, true]);
-        assert_eq!(open(&[(Vec3::splat(-9.0), Vec3::X), (Vec3::NAN, Vec3::X)]), [true; 3]);
+        assert_eq!(open(&[eye], &[]), [true, false, false]);
+        assert_eq!(open(&[eye, light], &[]), [true, false, true]);
+        assert_eq!(open(&[(Vec3::splat(-9.0), Vec3::X), (Vec3::NAN, Vec3::X)], &[]), [true; 3]);
+        let far = (Vec3::new(15.5, 4.5, 4.5), Vec3::ZERO);
+        assert_eq!(open(&[], &[eye, far]), [true, true, false]);
+        assert_eq!(open(&[], &[vec![eye; 300], vec![far]].concat()), [true, false, false]);
     }
 }
