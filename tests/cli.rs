@@ -216,6 +216,23 @@ fn integrators_are_listed() {
 }
 
 #[test]
+fn info_writes_the_skeleton() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.run("info scene.xml --skeleton s.ply --skeleton-image s.png --skeleton-cells 30").expect(0, &[]);
+    let row = run.stdout.lines().find_map(|l| l.strip_prefix("skeleton")).unwrap_or_default().trim();
+    let nodes: usize = row.split(' ').next().and_then(|n| n.parse().ok()).unwrap();
+    let ply = std::fs::read_to_string(sandbox.path("s.ply")).unwrap();
+    assert!(nodes > 0 && ply.contains(&format!("element vertex {nodes}\n")), "{row}");
+    sandbox.run("info scene.xml --skeleton s.obj").expect(0, &[]);
+    let obj = std::fs::read_to_string(sandbox.path("s.obj")).unwrap();
+    assert!(obj.lines().any(|l| l.starts_with("v ")));
+    for bad in ["--skeleton s.stl", "--skeleton s", "--skeleton-image s.ply"] {
+        sandbox.run(&format!("info scene.xml {bad}")).expect(2, &["known:"]);
+    }
+    sandbox.run("info scene.xml --skeleton no/such/folder/s.ply").expect(3, &["cannot be written"]);
+}
+
+#[test]
 fn info_counts() {
     let run = Sandbox::new().run("info scene.xml").expect(0, &[]);
     let row =

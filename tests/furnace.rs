@@ -150,7 +150,8 @@ fn white_materials_vanish_in_a_white_world() {
         let scene = prepare(parse(&open(bsdf), &[]), Backend::default_available(), None);
         for spec in unbiased().filter(|s| takes(s, &scene)) {
             let picture = Picture::render(spec, &scene, &[], 64, 1);
-            picture.assert_agrees(&Picture::constant(1.0, SIDE * SIDE), 0.0, &format!("{}: {name}", spec.name));
+            // Stratified roulette with a survival near one goes wrong so rarely that few renders know of no variance at all.
+            picture.assert_agrees(&Picture::constant(1.0, SIDE * SIDE), 0.005, &format!("{}: {name}", spec.name));
         }
     }
 }
@@ -173,7 +174,8 @@ fn no_material_makes_light() {
             let (mean, variance) = picture.whole;
             let p = chance((mean, variance), (1.0, 0.0), (picture.freedom, f64::INFINITY), 0.0);
             assert!(mean <= 1.0 || 0.5 * p >= SIGNIFICANCE, "{}: {name}: {mean}, p = {p:e}", spec.name);
-            assert!(mean > least, "{}: {name}: {mean}, at least {least} was expected", spec.name);
+            let (text, error) = (format!("{}: {name}: {mean}, at least {least} was expected", spec.name), variance.sqrt());
+            assert!(mean > least - 4.0 * error && error < 0.01, "{text}");
         }
     }
 }

@@ -175,6 +175,15 @@ pub(crate) struct ReplayArgs {
 pub(crate) struct InfoArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
+    /// Write the skeleton of empty space, nodes and edges, as lines: .ply or .obj
+    #[arg(long, value_name = "FILE")]
+    pub skeleton: Option<PathBuf>,
+    /// Draw the skeleton over the camera's view: .png, .exr or .pfm
+    #[arg(long, value_name = "FILE")]
+    pub skeleton_image: Option<PathBuf>,
+    /// Cubes along the longest side of the scene from which the skeleton is made [default: 120, and up to 240 for flat scenes]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=512))]
+    pub skeleton_cells: Option<u32>,
 }
 
 #[derive(Debug, Args)]

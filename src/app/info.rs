@@ -3,17 +3,26 @@
 use super::Failure;
 use super::cli::{InfoArgs, ListArgs};
 use super::config::unknown_integrator;
-use super::report;
-use crate::image::Pixels;
+use super::{report, skeleton};
+use crate::image::{OutputFormat, Pixels};
 use crate::integrators;
 use crate::prepared::{PrepareOptions, PreparedScene};
 use crate::ray::Backend;
+use crate::spatial::Skeleton;
+use std::time::Instant;
 
 fn mib(bytes: usize) -> String {
     format!("{:.2} MiB", bytes as f64 / f64::from(1 << 20))
 }
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    // Bad endings are found before anything is done.
+    if let Some(path) = &args.skeleton {
+        skeleton::LineFormat::of(path)?;
+    }
+    if let Some(path) = &args.skeleton_image {
+        OutputFormat::of(path).map_err(Failure::input)?;
+    }
     let (desc, mut diagnostics) = report::load(&args.scene, false)?;
     let said = diagnostics.list.len();
     out!("scene       {}", args.scene.scene.display());
@@ -60,6 +69,30 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     out!("radius      {:.4}, centre {:.4} {:.4} {:.4}", scene.radius, scene.centre.x, scene.centre.y, scene.centre.z);
     out!("features    {}", scene.features.names().join(", "));
     out!("backend     {}, tree built in {:.3} s", scene.query.describe(), scene.tree_seconds);
+    if args.skeleton.is_some() || args.skeleton_image.is_some() {
+        write_skeleton(args, &scene)?;
+    }
+    Ok(())
+}
+
+fn write_skeleton(args: &InfoArgs, scene: &PreparedScene) -> Result<(), Failure> {
+    let start = Instant::now();
+    let made = Skeleton::of_scene(scene, args.skeleton_cells.map(|c| c as usize));
+    let seconds = start.elapsed().as_secs_f64();
+    let ([w, h, d], _) = made.resolution();
+    out!(
+        "skeleton    {} nodes ({} before filtering), {} edges, {w}x{h}x{d} cells, node map {}, built in {seconds:.3} s",
+        made.nodes.len(),
+        made.unfiltered,
+        made.edges.len(),
+        mib(made.map_bytes())
+    );
+    if let Some(path) = &args.skeleton {
+        skeleton::write_lines(path, &made, scene.centre)?;
+    }
+    if let Some(path) = &args.skeleton_image {
+        skeleton::write_image(path, scene, &made)?;
+    }
     Ok(())
 }
 

@@ -30,6 +30,7 @@ mod pyramid;
 mod render;
 mod replay;
 mod report;
+mod skeleton;
 mod stage;
 
 use clap::Parser;
