@@ -174,8 +174,9 @@ fn no_material_makes_light() {
             let (mean, variance) = picture.whole;
             let p = chance((mean, variance), (1.0, 0.0), (picture.freedom, f64::INFINITY), 0.0);
             assert!(mean <= 1.0 || 0.5 * p >= SIGNIFICANCE, "{}: {name}: {mean}, p = {p:e}", spec.name);
-            let (text, error) = (format!("{}: {name}: {mean}, at least {least} was expected", spec.name), variance.sqrt());
-            assert!(mean > least - 4.0 * error && error < 0.01, "{text}");
+            let (text, error) =
+                (format!("{}: {name}: {mean}, at least {least} was expected", spec.name), variance.sqrt());
+            assert!(mean > least - 4.0 * error && error < 0.05, "{text}");
         }
     }
 }
