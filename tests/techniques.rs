@@ -9,7 +9,7 @@ mod scenes;
 use gallery::{GALLERY, exhibit};
 use lightsieve::film::Film;
 use lightsieve::film::pyramid::Side;
-use lightsieve::integrators::{Integrator, IntegratorSpec, Params, bdpt, light, resampling};
+use lightsieve::integrators::{Integrator, IntegratorSpec, Params, bdpt, importance, light, resampling};
 use lightsieve::math::Rgb;
 use lightsieve::prepared::{Features, PreparedScene};
 use lightsieve::ray::Backend;
@@ -66,9 +66,14 @@ fn each_technique_alone_makes_the_same_picture() {
     let few: &[(&str, &str)] = &[("paths", "7"), ("caches", "50000")];
     let many: &[(&str, &str)] = &[("paths", "300"), ("caches", "50000"), ("samples", "2")];
     let two: &[(&str, &str)] = &[("paths", "100"), ("caches", "50000"), ("second_stage", "16")];
-    for (spec, params) in
-        [(&bdpt::SPEC, &[][..]), (&resampling::RIS, few), (&resampling::PCBPT, many), (&resampling::TWO_STAGE, two)]
-    {
+    for (spec, params) in [
+        (&bdpt::SPEC, &[][..]),
+        (&resampling::RIS, few),
+        (&resampling::PCBPT, many),
+        (&resampling::TWO_STAGE, two),
+        (&importance::SKELETON, &[("paths", "100")]),
+        (&importance::IC_BDPT, &[("paths", "100"), ("records", "50000")]),
+    ] {
         techniques_agree(spec, params);
     }
 }
@@ -85,7 +90,7 @@ fn techniques_agree(spec: &'static IntegratorSpec, params: &[(&str, &str)]) {
             .into_par_iter()
             .map(|seed| {
                 let depth = EDGES.to_string();
-                let params = [&[("max_depth", &*depth), ("rr_depth", "3")], params].concat();
+                let params = [&[("max_depth", &*depth), ("rr_depth", "3"), ("skip", "never")], params].concat();
                 let mut integrator = build(spec, &params);
                 assert!(integrator.keep_pyramid(scene.window, EDGES));
                 run(&scene, &mut *integrator, SPP, 40 + seed);

@@ -3,6 +3,7 @@
 //! Parameters, help texts, refusals and the tests that run over every integrator come from [`REGISTRY`], never from a second list.
 
 pub mod bdpt;
+pub mod importance;
 pub mod light;
 pub mod params;
 pub mod path;
@@ -17,8 +18,17 @@ use crate::prepared::{Features, PreparedScene};
 use crate::ray::RayStats;
 
 /// Every integrator, by name.
-pub static REGISTRY: &[&IntegratorSpec] =
-    &[&path::SPEC, &light::SPEC, &bdpt::SPEC, &resampling::PCBPT, &resampling::RIS, &resampling::TWO_STAGE];
+pub static REGISTRY: &[&IntegratorSpec] = &[
+    &path::SPEC,
+    &light::SPEC,
+    &bdpt::SPEC,
+    &resampling::PCBPT,
+    &resampling::RIS,
+    &resampling::TWO_STAGE,
+    &importance::SKELETON,
+    &importance::IC_BDPT,
+    &importance::IMPORTANCE_CACHING,
+];
 
 /// What the registry knows of an integrator.
 pub struct IntegratorSpec {

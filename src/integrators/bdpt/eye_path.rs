@@ -328,29 +328,23 @@ impl WalkHooks for EyeHooks<'_, '_> {
             if techniques.uses(1, t) {
                 self.next_event(vertex, tracer, sampler);
             }
-            let possible = |y: &LightVertex| (y.s + t - 1) as u64 <= u64::from(max_edges) && techniques.uses(y.s, t);
+            let possible = |s: usize| (s + t - 1) as u64 <= u64::from(max_edges) && techniques.uses(s, t);
             let light = self.light;
             match &this.resampler {
                 None => {
-                    for y in light.vertices.iter().filter(|y| possible(y)) {
+                    for y in light.vertices.iter().filter(|y| possible(y.s)) {
                         self.connect(vertex, &Candidate::of(light, y, 1.0 / this.effort.connections), tracer);
                     }
                 }
                 Some(resampler) => {
-                    for _ in 0..resampler.settings.samples {
-                        let u = sampler.rng().next_4();
-                        let effort = this.effort.connections;
-                        if u[2] < effort
-                            && let Some(candidate) = resampler.draw(vertex.point, vertex.wo, [u[0], u[1]], effort)
-                            && possible(candidate.vertex)
-                        {
-                            self.connect(vertex, &candidate, tracer);
-                        }
-                    }
+                    let (place, effort) = ((vertex.point, vertex.wo), this.effort.connections);
+                    resampler.draw_all(place, sampler.rng(), effort, possible, |candidate| {
+                        self.connect(vertex, &candidate, tracer);
+                    });
                 }
             }
         }
-        true
+        (vertex.index as usize + 1) < self.this.most_eye_vertices
     }
 
     fn leaving(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample) {

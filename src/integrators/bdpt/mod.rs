@@ -127,6 +127,8 @@ pub(super) struct Bidirectional {
     pub(super) limits: Limits,
     hide_emitters: bool,
     pub(super) weigher: Weigher,
+    /// Eye sub-paths end where no technique uses more of their vertices.
+    pub(super) most_eye_vertices: usize,
     /// The light sub-path of a pixel is connected to its eye sub-path.
     pub(super) connects: bool,
     /// Connections are drawn from many light sub-paths instead.
@@ -151,6 +153,7 @@ impl Bidirectional {
         Bidirectional {
             limits,
             hide_emitters: params.bool("hide_emitters"),
+            most_eye_vertices: techniques.most_eye_vertices(),
             connects: techniques.uses_connections(),
             weigher: Weigher { techniques, heuristic, roulette_from: limits.roulette_from, resampled: None },
             resampler: None,
@@ -441,7 +444,8 @@ impl Integrator for Bidirectional {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.sizing.iter().filter_map(Sizing::note).collect()
+        let sites = self.resampler.as_ref().and_then(Resampler::note);
+        sites.into_iter().chain(self.sizing.as_ref().and_then(Sizing::note)).collect()
     }
 
     fn keep_pyramid(&mut self, window: [u32; 4], max_edges: usize) -> bool {

@@ -23,12 +23,12 @@ const CACHE_STREAM: u64 = 4;
 
 /// A cache point.
 #[derive(Clone, Copy, Debug)]
-struct Cache {
-    p: Vec3,
+pub(super) struct Cache {
+    pub p: Vec3,
     /// Unit normal on the side that the eye sub-path saw.
-    side: Vec3,
-    error: f32,
-    ng: Vec3,
+    pub side: Vec3,
+    pub error: f32,
+    pub ng: Vec3,
 }
 
 /// A fixed set of cache points with their estimates.
@@ -166,7 +166,8 @@ impl Caches {
     }
 }
 
-fn place(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits) -> (Vec<Cache>, RayStats) {
+/// The vertices of `fraction` times as many eye sub-paths as the full picture has pixels.
+pub(super) fn place(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits) -> (Vec<Cache>, RayStats) {
     let [width, height] = scene.film_size.map(f64::from);
     let scale = fraction.sqrt();
     let [columns, rows] = [width, height].map(|s| ((s * scale).round() as u64).max(1));

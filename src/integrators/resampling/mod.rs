@@ -22,8 +22,10 @@
 
 pub(in crate::integrators) mod caches;
 mod pmfs;
+mod combined;
 mod prepare;
 pub(in crate::integrators) mod resampler;
+mod sites;
 pub(in crate::integrators) mod store;
 
 use super::bdpt::sizing;
@@ -61,6 +63,8 @@ const CACHES: ParamSpec = ParamSpec {
     about: "eye sub-paths that make cache points, per 100 000 pixels",
     default: ParamDefault::Int(400, 0, 100_000),
 };
+/// Groups share their first stage and have but few vertices to ask for: they may be denser.
+const GROUPED_CACHES: ParamSpec = ParamSpec { default: ParamDefault::Int(1600, 0, 100_000), ..CACHES };
 const EPSILON: ParamSpec = ParamSpec {
     name: "epsilon",
     about: "smallest ratio of densities p/q that weights use, in millionths",
@@ -92,7 +96,7 @@ const TWO_STAGE_PARAMS: [ParamSpec; 12] = [
     SECOND_STAGE,
     SAMPLES,
     NEIGHBOURS,
-    CACHES,
+    GROUPED_CACHES,
     EPSILON,
     weights("two-stage", &["balance", "ris", "two-stage"]),
     SKIP,
@@ -100,6 +104,7 @@ const TWO_STAGE_PARAMS: [ParamSpec; 12] = [
 
 fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Integrator> {
     let settings = Settings {
+        scheme: Scheme::Caches,
         paths: params.int("paths") as u32,
         second_stage,
         samples: params.int("samples") as u32,
@@ -171,9 +176,27 @@ pub(in crate::integrators) enum Weights {
     TwoStage,
 }
 
+/// Where probabilities are kept, and of what.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::integrators) enum Scheme {
+    /// At cache points, of all light vertices together (`pmfs.rs`).
+    Caches,
+    /// At importance records, of the light vertices of each length or, if `pooled`, of all together (`combined.rs`).
+    Records { pooled: bool },
+    /// At nodes of the skeleton of empty space, of the light vertices of each length.
+    Skeleton {
+        /// Voxels along the longest side of the scene, if not decided by the scene.
+        cells: Option<usize>,
+        /// Share of the mean number of eye vertices that a node must have to be used.
+        acceptance: f64,
+    },
+}
+
 /// What a user decides.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::integrators) struct Settings {
+    /// Where probabilities are kept.
+    pub scheme: Scheme,
     /// M; 0: decided by the size of the picture.
     pub paths: u32,
     /// M₂, if there are two stages.

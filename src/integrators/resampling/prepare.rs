@@ -1,10 +1,11 @@
 //! What happens between iterations: light sub-paths are traced, probabilities found, normalisations learnt, states restored.
 
-use super::Settings;
 use super::caches::Caches;
 use super::pmfs::Pmfs;
 use super::resampler::Resampler;
+use super::sites::Sites;
 use super::store::LightStore;
+use super::{Scheme, Settings};
 use crate::integrators::Iteration;
 use crate::integrators::bdpt::{Bidirectional, Piece};
 use crate::ray::{Phases, RayStats};
@@ -36,8 +37,25 @@ impl Bidirectional {
             let [width, height] = scene.film_size;
             resampler.settings.paths = width.saturating_mul(height).min(MOST_BY_DEFAULT);
         }
-        let Settings { cache_fraction, second_stage, paths, .. } = resampler.settings;
+        let Settings { scheme, cache_fraction, second_stage, paths, .. } = resampler.settings;
         let clusters = second_stage.map(|m2| m2 as usize);
+        if !matches!(scheme, Scheme::Caches) {
+            let (sites, s) = match scheme {
+                Scheme::Skeleton { cells, acceptance } => {
+                    Sites::nodes(scene, iteration.seed, cells, acceptance, &self.limits)
+                }
+                _ => Sites::records(scene, iteration.seed, cache_fraction, &self.limits),
+            };
+            stats.merge(&s);
+            resampler.sites = Some(sites);
+            if scheme != (Scheme::Records { pooled: true }) {
+                let first = Iteration { index: 0, ..*iteration };
+                let (store, s) = LightStore::trace(self, &first, WARM_UP_PATHS, 1);
+                stats.merge(&s);
+                self.know_lengths(store.lengths(), WARM_UP_PATHS);
+            }
+            return;
+        }
         let (mut caches, s) = Caches::new(scene, iteration.seed, cache_fraction, &self.limits, second_stage.is_some());
         stats.merge(&s);
         let first = Iteration { index: 0, ..*iteration };
@@ -56,11 +74,20 @@ impl Bidirectional {
         }
     }
 
+    /// How many of `paths` light sub-paths have a vertex number s, by s.
+    fn know_lengths(&mut self, counts: Vec<u32>, paths: u32) {
+        let Some(resampler) = &mut self.resampler else { return };
+        // A length that was not met is not impossible.
+        resampler.lengths = counts.iter().map(|&n| (n as f32).max(0.5) / paths as f32).collect();
+        let resampler = &*resampler;
+        self.weigher.techniques.set_lengths(|s| resampler.share_of_length(s));
+    }
+
     /// Gets the candidates of an iteration ready. All its light sub-paths are traced, and what the lens sees of them is brought back:
     /// those to draw from are the first of them.
     pub(in crate::integrators) fn prepare_resampling(&mut self, iteration: &Iteration) -> (RayStats, Vec<Piece>) {
         let (mut stats, mut phases) = (RayStats::default(), Phases::default());
-        if self.resampler.as_ref().is_some_and(|r| r.caches.is_none()) {
+        if self.resampler.as_ref().is_some_and(|r| r.caches.is_none() && r.sites.is_none()) {
             phases.time("placing caches", || self.prepare_caches(iteration, &mut stats));
         }
         let Some(resampler) = &mut self.resampler else { return (stats, vec![]) };
@@ -71,6 +98,11 @@ impl Bidirectional {
         phases.time("light tree", || store.finish());
         let Some(resampler) = &mut self.resampler else { return (stats, pieces) };
         resampler.store = store;
+        if let Some(sites) = &resampler.sites {
+            let pooled = matches!(resampler.settings.scheme, Scheme::Records { pooled: true });
+            let (combined, store) = (&mut resampler.combined, &resampler.store);
+            stats.merge(&phases.time("pmfs", || combined.find(iteration.scene, sites, store, pooled)));
+        }
         if let Some(caches) = &resampler.caches {
             let (pmfs, store) = (&mut resampler.pmfs, &resampler.store);
             let random = (iteration.seed, iteration.index);

@@ -1,11 +1,14 @@
 //! What resampled connections know in an iteration: candidates, how to draw from them, and what weights need.
 
 use super::caches::Caches;
+use super::combined::CombinedPmfs;
 use super::pmfs::{Choice, Pmfs};
+use super::sites::Sites;
 use super::store::LightStore;
-use super::{Settings, Weights};
+use super::{Scheme, Settings, Weights};
 use crate::integrators::bdpt::eye_path::Candidate;
 use crate::math::Vec3;
+use crate::math::hash::HashRng;
 use crate::mis::{Resampled, Targets, Weigher};
 use crate::shade::SurfacePoint;
 use crate::spatial::nearest::MOST;
@@ -17,6 +20,11 @@ pub(in crate::integrators) struct Resampler {
     pub(super) caches: Option<Caches>,
     pub(super) store: LightStore,
     pub(super) pmfs: Pmfs,
+    /// Sites of importance caching, and probabilities there.
+    pub(super) sites: Option<Sites>,
+    pub(super) combined: CombinedPmfs,
+    /// Where sub-paths of each length are drawn from by themselves: the share of sub-paths that are as long.
+    pub(super) lengths: Vec<f32>,
     /// Sum over sets of the number of vertices, and of sub-paths.
     pub(super) seen: [u64; 2],
     /// Seed and number of the iteration that is ready to be replayed.
@@ -36,6 +44,9 @@ impl Resampler {
             caches: None,
             store: LightStore::default(),
             pmfs: Pmfs::default(),
+            sites: None,
+            combined: CombinedPmfs::default(),
+            lengths: vec![],
             seen: [0; 2],
             ready: None,
         }
@@ -77,13 +88,67 @@ impl Resampler {
         })
     }
 
+    /// Draws candidates for an eye vertex at `point` that looks from the side of `wo`, and hands them to `connect`. Only a share `effort` of
+    /// draws is made. `possible` says which numbers of light vertices are wanted.
+    #[inline]
+    pub fn draw_all<'a>(
+        &'a self,
+        (point, wo): (&SurfacePoint, Vec3),
+        rng: &mut HashRng,
+        effort: f32,
+        possible: impl Fn(usize) -> bool,
+        mut connect: impl FnMut(Candidate<'a>),
+    ) {
+        if self.store.is_empty() {
+            return;
+        }
+        if matches!(self.settings.scheme, Scheme::Caches) {
+            for _ in 0..self.settings.samples {
+                let u = rng.next_4();
+                if u[2] < effort
+                    && let Some(candidate) = self.draw(point, wo, [u[0], u[1]], effort)
+                    && possible(candidate.vertex.s)
+                {
+                    connect(candidate);
+                }
+            }
+            return;
+        }
+        let Some(sites) = &self.sites else { return };
+        let mut found = [0; MOST];
+        let count = sites.find(point.p, side(point, wo), self.settings.neighbours, &mut found);
+        for class in 0..self.combined.classes() {
+            let length = self.combined.length(class);
+            if length.is_some_and(|s| !possible(s)) {
+                continue;
+            }
+            // Long sub-paths are rare and dim: no more of them are connected to than a pixel's own sub-path would have.
+            let effort = effort * length.map_or(1.0, |s| self.share_of_length(s));
+            for _ in 0..self.settings.samples {
+                let u = rng.next_4();
+                if u[2] >= effort {
+                    continue;
+                }
+                let drawn = self.combined.draw(class, &found[..count], [u[0], u[1]]);
+                let number = self.settings.paths as f32 * self.settings.samples as f32;
+                let candidate = self.store.candidate(drawn.vertex, 1.0 / (drawn.probability * number * effort));
+                if possible(candidate.vertex.s) {
+                    connect(candidate);
+                }
+            }
+        }
+    }
+
+    /// Share of light sub-paths with at least s vertices, as far as is known; never zero.
+    pub(super) fn share_of_length(&self, s: usize) -> f32 {
+        let last = self.lengths.last().copied().unwrap_or(1.0);
+        self.lengths.get(s).copied().unwrap_or(last)
+    }
+
     /// Draws a candidate for an eye vertex at `point` that looks from the side of `wo`; `None` if there are none. Only a share
     /// `effort` of draws is made.
     #[inline]
-    pub fn draw(&self, point: &SurfacePoint, wo: Vec3, u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
-        if self.store.is_empty() {
-            return None;
-        }
+    fn draw(&self, point: &SurfacePoint, wo: Vec3, u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
         let (mut near, mut n) = ([0; MOST], 0);
         if let Some(caches) = &self.caches {
             for i in caches.index.find(point.p, side(point, wo)).take(self.settings.neighbours) {
@@ -108,6 +173,14 @@ impl Resampler {
         }
         let (vertex, p) = self.store.tree.draw(&(0..all), u)?;
         Some(Choice { vertex, probability: p as f32 })
+    }
+
+    /// What there is to draw by, for people.
+    pub fn note(&self) -> Option<String> {
+        match (&self.caches, &self.sites) {
+            (Some(caches), _) => Some(format!("{} cache points in {} groups", caches.index.len(), caches.groups.len())),
+            (_, sites) => sites.as_ref().map(Sites::note),
+        }
     }
 
     /// What must be saved to go on later, as bytes.

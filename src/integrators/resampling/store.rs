@@ -166,6 +166,14 @@ impl LightStore {
         self.order.len()
     }
 
+    /// For each number of vertices, how many sub-paths can be connected to by their vertex of that number; one more is zero.
+    pub fn lengths(&self) -> Vec<u32> {
+        let most = self.vertices.iter().map(|v| v.vertex.s).max().unwrap_or(0);
+        let mut counts = vec![0; most + 2];
+        self.vertices.iter().for_each(|v| counts[v.vertex.s] += 1);
+        counts
+    }
+
     /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.order.is_empty()
