@@ -12,7 +12,7 @@ use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, resamplin
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
 use lightsieve::mis::definition::{Densities, densities};
 use lightsieve::mis::{Heuristic, Joint, Node, Split, Targets, Techniques, Weigher};
-use lightsieve::path::FullPath;
+use lightsieve::path::{FullPath, Limits};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
 use scenes::{parse, prepare};
@@ -43,7 +43,8 @@ fn found(
 fn weigher(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, roulette_from: u32) -> Weigher {
     let mut techniques = Techniques::parse(techniques).unwrap();
     techniques.set_light_paths(scene.film_size[0] as f32 * scene.film_size[1] as f32);
-    Weigher { techniques, heuristic, roulette_from, resampled: None }
+    let limits = Limits { max_edges: u32::MAX, roulette_from, keep: 1.0 };
+    Weigher { techniques, heuristic, eye_limits: limits, light_limits: limits, resampled: None }
 }
 
 const SUBSETS: [&str; 6] = ["all", "-*:1", "-0:*", "-1:*", "all,-2:2,-3:1,-0:3", "-*:1,-0:*"];
@@ -80,7 +81,13 @@ fn resampling_aware_weights_are_those_of_the_definition() {
             let roulette = ["5", "1", "2"][i % 3];
             let paths = ["200", "7", "1"][i % 3];
             // A film of 64 pixels needs more than its share of cache points.
-            let params = [("techniques", techniques), ("rr_depth", roulette), ("paths", paths), ("caches", "50000")];
+            let params = [
+                ("techniques", techniques),
+                ("rr_depth", roulette),
+                ("paths", paths),
+                ("caches", "50000"),
+                ("keep", ["100", "40"][i % 2]),
+            ];
             let two_stage = [&params[..], &[("second_stage", ["16", "1", "200"][i % 3])]].concat();
             let one = found(&resampling::RIS, &scene, &params, 2);
             for c in one.into_iter().chain(found(&resampling::TWO_STAGE, &scene, &two_stage, 2)) {

@@ -4,7 +4,7 @@
 use super::{Targets, Weigher, spread};
 use crate::emit::LightEnd;
 use crate::math::{Rgb, Vec3};
-use crate::path::{FullPath, survival};
+use crate::path::FullPath;
 use crate::prepared::PreparedScene;
 use crate::shade::{SurfacePoint, Transport};
 
@@ -52,7 +52,8 @@ pub fn densities(
     let scatter = |i: usize, from: Vec3, to: Vec3, towards_lens: bool| -> f64 {
         let v = &path.interior[i - 1];
         let number = if towards_lens { i } else { k - i };
-        let survives = if number >= weigher.roulette_from as usize { survival(&v.bsdf) } else { 1.0 };
+        let limits = if towards_lens { &weigher.light_limits } else { &weigher.eye_limits };
+        let survives = limits.survival(number as u32, &v.bsdf);
         let pdf = match v.delta {
             Some((pdfs, _)) => pdfs[usize::from(!towards_lens)],
             None => v.bsdf.pdf(from, to, Transport::Radiance),

@@ -19,7 +19,7 @@ pub struct Node {
     /// |cos| there / distance²; 1 if that vertex is at infinity. Of a vertex that is itself at infinity: |cos| there, for the density
     /// per unit area of the emission disk.
     pub spread: f32,
-    /// Survival of roulette at this vertex, where it is played.
+    /// Survival of roulette at this vertex, where the walk from the other end plays it.
     pub survival: f32,
     /// Area density of this vertex when it is walked to from the other end, without the survival at the vertex after it, over
     /// `forward`. Valid once the walk has left the vertex after it.

@@ -16,6 +16,7 @@
 use super::side::Node;
 use super::{Heuristic, Resampled, Targets, Techniques};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
+use crate::path::Limits;
 
 /// How the last vertex of a side would have been walked through from the other end.
 #[derive(Clone, Copy, Debug)]
@@ -58,8 +59,10 @@ pub struct Weigher {
     pub techniques: Techniques,
     /// β.
     pub heuristic: Heuristic,
-    /// First vertex, counted from the end that walks, at which roulette is played.
-    pub roulette_from: u32,
+    /// Roulette of eye sub-paths.
+    pub eye_limits: Limits,
+    /// Roulette of light sub-paths, which begin it at the same number of vertices from their end.
+    pub light_limits: Limits,
     /// How connections with s ≥ 2 and t ≥ 2 are resampled, if they are and weights know of it.
     pub resampled: Option<Resampled>,
 }
@@ -97,7 +100,7 @@ impl Weigher {
     /// Survival at a vertex that is number `index` counted from the other end.
     #[inline]
     fn survival(&self, node: &Node, index: usize) -> f32 {
-        if index >= self.roulette_from as usize { node.survival } else { 1.0 }
+        if index >= self.eye_limits.roulette_from as usize { node.survival } else { 1.0 }
     }
 
     /// Which sum a technique's share belongs to.

@@ -10,4 +10,4 @@ pub mod walk;
 pub use full::{FullPath, Interior, Origin};
 pub use shadow::{ShadowQueue, direct_segment};
 pub use vertex::{Edge, SurfaceVertex};
-pub use walk::{Limits, WalkHooks, WalkStart, survival, walk};
+pub use walk::{Limits, WalkHooks, WalkStart, walk};

@@ -35,6 +35,8 @@ pub struct Limits {
     pub max_edges: u32,
     /// Vertex index from which Russian roulette is played; the first hit is 1.
     pub roulette_from: u32,
+    /// Where roulette is played and the vertex can be connected to, survival is lower by this factor.
+    pub keep: f32,
 }
 
 /// Survival probability of Russian roulette never exceeds this, so that walks between white mirrors end.
@@ -42,7 +44,7 @@ const MAX_SURVIVAL: f32 = 0.95;
 
 /// Probability to go on after a vertex with the BSDF `bsdf` where roulette is played: the same from either end of the path.
 #[inline]
-pub fn survival(bsdf: &Bsdf) -> f32 {
+fn survival(bsdf: &Bsdf) -> f32 {
     bsdf.albedo().max_component().min(MAX_SURVIVAL)
 }
 
@@ -50,7 +52,14 @@ impl Limits {
     /// Probability to go on after vertex `index` with the BSDF `bsdf`; a function of the vertex alone.
     #[inline]
     pub fn survival(&self, index: u32, bsdf: &Bsdf) -> f32 {
-        if index < self.roulette_from { 1.0 } else { survival(bsdf) }
+        if index < self.roulette_from { 1.0 } else { self.roulette(bsdf) }
+    }
+
+    /// The same at a vertex where roulette is played.
+    #[inline]
+    pub fn roulette(&self, bsdf: &Bsdf) -> f32 {
+        let survival = survival(bsdf);
+        if self.keep < 1.0 && bsdf.connectable() { survival * self.keep } else { survival }
     }
 }
 

@@ -10,7 +10,7 @@ use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::{Joint, Node, Side, Split, Targets, Weight, spread};
-use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment, survival};
+use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment};
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 use crate::ray::offset::{SegmentEnd, segment};
@@ -214,7 +214,7 @@ impl EyeHooks<'_, '_> {
             LightEnd::Point { .. } | LightEnd::Infinite => 1.0,
         };
         let origin = sample.end.vertex_density(position, emission) * chosen;
-        let walked = bsdf_pdf.0 * self.this.limits.survival(vertex.index, vertex.bsdf);
+        let walked = bsdf_pdf.0 * self.this.weigher.eye_limits.survival(vertex.index, vertex.bsdf);
         let back = vertex.bsdf.eval_and_pdf(sample.wi, vertex.wo, Transport::Importance);
         let split = Split {
             light: &[Node::origin(origin)],
@@ -257,9 +257,9 @@ impl EyeHooks<'_, '_> {
         if raw.is_black() {
             return;
         }
-        let limits = &self.this.limits;
-        let eye_pdf = eye_pdf.0 * limits.survival(vertex.index, vertex.bsdf);
-        let light_pdf = light_pdf.0 * limits.survival(light.s as u32 - 1, &light.bsdf);
+        let weigher = &self.this.weigher;
+        let eye_pdf = eye_pdf.0 * weigher.eye_limits.survival(vertex.index, vertex.bsdf);
+        let light_pdf = light_pdf.0 * weigher.light_limits.survival(light.s as u32 - 1, &light.bsdf);
         let back = vertex.bsdf.eval_and_pdf(to_light, vertex.wo, Transport::Importance);
         let scattered = light.throughput * at_light;
         let arriving = scattered * (1.0 / light_pdf);
@@ -302,7 +302,11 @@ impl WalkHooks for EyeHooks<'_, '_> {
         let dist2 = edge.distance * edge.distance;
         let cos = point.ng.dot(vertex.wo);
         let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
-        self.side.arrive(forward, spread(self.cos_leaving, dist2), survival(vertex.bsdf));
+        self.side.arrive(
+            forward,
+            spread(self.cos_leaving, dist2),
+            self.this.weigher.light_limits.roulette(vertex.bsdf),
+        );
         if let Some(node) = self.side.last_mut() {
             node.cos = cos.abs();
         }
@@ -320,7 +324,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
         if vertex.bsdf.is_black() {
             return false;
         }
-        let max_edges = self.this.limits.max_edges;
+        let max_edges = self.this.weigher.eye_limits.max_edges;
         if vertex.index < max_edges && vertex.bsdf.connectable() {
             let t = vertex.index as usize + 1;
             let this = self.this;

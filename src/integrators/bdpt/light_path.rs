@@ -6,7 +6,7 @@ use crate::integrators::replay::{Contribution, Replay};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::{Joint, Node, Side, Split, Targets, Weight, spread};
-use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, survival, walk};
+use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
 use crate::ray::{Ray, RayKind, Segment, T_MIN, Tracer};
@@ -79,7 +79,7 @@ pub(in crate::integrators) fn trace(
         keep,
     };
     hooks.emitter_to_lens([v[2], v[3]], tracer, sampler);
-    if flux.is_black() || this.limits.max_edges < 2 {
+    if flux.is_black() || this.weigher.light_limits.max_edges < 2 {
         return;
     }
     let start = WalkStart {
@@ -97,7 +97,8 @@ pub(in crate::integrators) fn trace(
         kind: RayKind::Light,
     };
     // One edge of a path is left for the connection.
-    let limits = crate::path::Limits { max_edges: this.limits.max_edges - 1, ..this.limits };
+    let limits =
+        crate::path::Limits { max_edges: this.weigher.light_limits.max_edges - 1, ..this.weigher.light_limits };
     walk(scene, start, &limits, Transport::Importance, tracer, sampler, &mut hooks);
 }
 
@@ -283,6 +284,7 @@ impl WalkHooks for LightHooks<'_, '_> {
         let (index, point, edge) = (vertex.index, vertex.point, vertex.edge);
         let dist2 = edge.distance * edge.distance;
         let cos = point.ng.dot(vertex.wo);
+        let eye_survival = self.this.weigher.eye_limits.roulette(vertex.bsdf);
         if index == 1 {
             let emission = self.emission;
             let forward = emission.end.next_density(emission.pdf_position, emission.pdf_direction, cos, dist2);
@@ -291,11 +293,11 @@ impl WalkHooks for LightHooks<'_, '_> {
                 LightEnd::Point { .. } => 1.0 / dist2,
                 LightEnd::Infinite => 1.0,
             };
-            self.out.side.arrive(forward, to_light, survival(vertex.bsdf));
+            self.out.side.arrive(forward, to_light, eye_survival);
             self.out.next_event = self.next_event(vertex, to_light);
         } else {
             let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
-            self.out.side.arrive(forward, spread(self.cos_leaving, dist2), survival(vertex.bsdf));
+            self.out.side.arrive(forward, spread(self.cos_leaving, dist2), eye_survival);
             if let (Some(resampler), Some(node)) = (&self.this.resampler, self.out.side.last_mut()) {
                 // What the sub-path brings here is its throughput times the density of having come here.
                 let brings = Targets {

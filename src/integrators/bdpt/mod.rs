@@ -124,7 +124,6 @@ pub(crate) struct Found {
 
 /// Bidirectional path tracing with any set of techniques; light tracing is one of them.
 pub(super) struct Bidirectional {
-    pub(super) limits: Limits,
     hide_emitters: bool,
     pub(super) weigher: Weigher,
     /// Eye sub-paths end where no technique uses more of their vertices.
@@ -149,13 +148,13 @@ impl Bidirectional {
         let limits = Limits {
             max_edges: u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX),
             roulette_from: params.int("rr_depth") as u32,
+            keep: 1.0,
         };
         Bidirectional {
-            limits,
             hide_emitters: params.bool("hide_emitters"),
             most_eye_vertices: techniques.most_eye_vertices(),
             connects: techniques.uses_connections(),
-            weigher: Weigher { techniques, heuristic, roulette_from: limits.roulette_from, resampled: None },
+            weigher: Weigher { techniques, heuristic, eye_limits: limits, light_limits: limits, resampled: None },
             resampler: None,
             effort: Effort::FULL,
             sizing: None,
@@ -286,7 +285,7 @@ impl Bidirectional {
             delta: false,
             kind: RayKind::Camera,
         };
-        walk(scene, start, &self.limits, Transport::Radiance, tracer, &mut sampler, &mut hooks);
+        walk(scene, start, &self.weigher.eye_limits, Transport::Radiance, tracer, &mut sampler, &mut hooks);
     }
 
     /// All light sub-paths of an iteration whose eye vertices draw from the first `kept` of them, which are left in `store`.

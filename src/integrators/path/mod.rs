@@ -67,6 +67,7 @@ impl PathTracer {
             limits: Limits {
                 max_edges: u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX),
                 roulette_from: params.int("rr_depth") as u32,
+                keep: 1.0,
             },
             hide_emitters: params.bool("hide_emitters"),
             heuristic: if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power },

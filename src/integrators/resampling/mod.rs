@@ -41,6 +41,11 @@ const PATHS: ParamSpec = ParamSpec {
 };
 /// One of many connections is drawn: they need not be as many.
 const RR_DEPTH: ParamSpec = ParamSpec { default: ParamDefault::Int(1, 1, 1_000_000), ..super::bdpt::RR_DEPTH };
+const KEEP: ParamSpec = ParamSpec {
+    name: "keep",
+    about: "percent of an eye sub-path's survival of Russian roulette where it has been connected: lower, more of them end early",
+    default: ParamDefault::Int(100, 1, 100),
+};
 const FIRST_STAGE: ParamSpec = ParamSpec {
     name: "paths",
     about: "M1, light sub-paths per iteration for the first stage; 0: 10000, or the number of pixels if that is less",
@@ -80,16 +85,17 @@ const fn weights(default: &'static str, choices: &'static [&'static str]) -> Par
 }
 
 /// The parameters of methods with one stage; they differ in the weights they take by default.
-const fn one_stage(default_weights: &'static str) -> [ParamSpec; 11] {
+const fn one_stage(default_weights: &'static str) -> [ParamSpec; 12] {
     let weights = weights(default_weights, &["balance", "ris"]);
-    [MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, NEIGHBOURS, CACHES, EPSILON, weights, SKIP]
+    [MAX_DEPTH, RR_DEPTH, KEEP, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, NEIGHBOURS, CACHES, EPSILON, weights, SKIP]
 }
 
-const PCBPT_PARAMS: [ParamSpec; 11] = one_stage("balance");
-const RIS_PARAMS: [ParamSpec; 11] = one_stage("ris");
-const TWO_STAGE_PARAMS: [ParamSpec; 12] = [
+const PCBPT_PARAMS: [ParamSpec; 12] = one_stage("balance");
+const RIS_PARAMS: [ParamSpec; 12] = one_stage("ris");
+const TWO_STAGE_PARAMS: [ParamSpec; 13] = [
     MAX_DEPTH,
     RR_DEPTH,
+    KEEP,
     HIDE_EMITTERS,
     TECHNIQUES,
     FIRST_STAGE,
@@ -118,6 +124,7 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
         },
     };
     let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
+    this.weigher.eye_limits.keep = params.int("keep") as f32 * 0.01;
     this.resample(settings);
     if params.choice("skip") == "auto" {
         this.size_by_scene();

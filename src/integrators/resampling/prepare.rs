@@ -26,7 +26,7 @@ impl Bidirectional {
 
     /// Connections of this iteration are drawn from light sub-paths that are traced before.
     pub(in crate::integrators) fn resamples(&self) -> bool {
-        self.resampler.is_some() && self.weigher.techniques.uses_connections() && self.limits.max_edges >= 3
+        self.resampler.is_some() && self.weigher.techniques.uses_connections() && self.weigher.eye_limits.max_edges >= 3
     }
 
     /// Cache points and first normalisations, once; they are functions of scene and seed alone.
@@ -42,9 +42,9 @@ impl Bidirectional {
         if !matches!(scheme, Scheme::Caches) {
             let (sites, s) = match scheme {
                 Scheme::Skeleton { cells, acceptance } => {
-                    Sites::nodes(scene, iteration.seed, cells, acceptance, &self.limits)
+                    Sites::nodes(scene, iteration.seed, cells, acceptance, &self.weigher.eye_limits)
                 }
-                _ => Sites::records(scene, iteration.seed, cache_fraction, &self.limits),
+                _ => Sites::records(scene, iteration.seed, cache_fraction, &self.weigher.eye_limits),
             };
             stats.merge(&s);
             resampler.sites = Some(sites);
@@ -56,7 +56,8 @@ impl Bidirectional {
             }
             return;
         }
-        let (mut caches, s) = Caches::new(scene, iteration.seed, cache_fraction, &self.limits, second_stage.is_some());
+        let (mut caches, s) =
+            Caches::new(scene, iteration.seed, cache_fraction, &self.weigher.eye_limits, second_stage.is_some());
         stats.merge(&s);
         let first = Iteration { index: 0, ..*iteration };
         let (mut seen, mut pmfs) = ([0, 0], Pmfs::default());
