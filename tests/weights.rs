@@ -11,7 +11,7 @@ use lightsieve::integrators::replay::Contribution;
 use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, resampling};
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
 use lightsieve::mis::definition::{Densities, densities};
-use lightsieve::mis::{Heuristic, Joint, Node, Split, Targets, Techniques, Weigher};
+use lightsieve::mis::{Heuristic, Joint, Node, Split, Techniques, There, Weigher};
 use lightsieve::path::{FullPath, Limits};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
@@ -154,7 +154,7 @@ fn weights_of_all_techniques_sum_to_one() {
         for path in &paths {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
                 let weigher = weigher(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], 5);
-                let d = densities(&scene, &weigher, &|_, _| Targets::default(), path);
+                let d = densities(&scene, &weigher, &|_, _| There::default(), path);
                 let slow = d.weights(&weigher);
                 // A subset need not have any technique that makes the path; single precision has no densities beyond its range.
                 let extreme = |p: &f64| *p > 0.0 && !(1e-15..1e15).contains(p);

@@ -2,7 +2,7 @@
 
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::mis::definition::densities;
-use crate::mis::{Targets, Weigher};
+use crate::mis::{There, Weigher};
 use crate::path::{FullPath, Interior, Origin, SurfaceVertex};
 use crate::prepared::PreparedScene;
 use crate::shade::{BsdfSample, SurfacePoint};
@@ -107,12 +107,12 @@ impl Replay {
 
     /// Notes a contribution and its path; returns its number.
     ///
-    /// `there` is the Q of both targets at a point, on the side of a direction, of integrators whose weights know of resampling.
+    /// `there` is what is known of the light at a point, on the side of a direction, of integrators whose weights know of resampling.
     pub fn found(
         &mut self,
         scene: &PreparedScene,
         weigher: &Weigher,
-        there: &dyn Fn(&SurfacePoint, Vec3) -> Targets,
+        there: &dyn Fn(&SurfacePoint, Vec3) -> There,
         mut contribution: Contribution,
         path: Option<FullPath>,
     ) -> u32 {

@@ -1,7 +1,7 @@
 //! The weights of a path by their definition: all densities of all its vertices from both ends, multiplied up in double
 //! precision logarithms (Veach 1997, §10.2). The oracle of [`Weigher`], and what explains a single sample.
 
-use super::{Targets, Weigher, spread};
+use super::{Targets, There, Weigher, spread};
 use crate::emit::LightEnd;
 use crate::math::{Rgb, Vec3};
 use crate::path::FullPath;
@@ -23,12 +23,12 @@ pub struct Densities {
     pub factors: Vec<f64>,
 }
 
-/// Densities of `path` where sub-paths play roulette as `weigher` says. `there` is Q of both targets at a point, on the side of a
+/// Densities of `path` where sub-paths play roulette as `weigher` says. `there` is what is known of the light at a point, on the side of a
 /// direction; only weights that know of resampling ask for it.
 pub fn densities(
     scene: &PreparedScene,
     weigher: &Weigher,
-    there: &dyn Fn(&SurfacePoint, Vec3) -> Targets,
+    there: &dyn Fn(&SurfacePoint, Vec3) -> There,
     path: &FullPath,
 ) -> Densities {
     let k = path.edges();

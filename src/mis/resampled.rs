@@ -18,6 +18,11 @@
 //!
 //! The uniform share is one over the M₂, which are distributed as q₁: q₂/p = (1 − u) a₂/Q₂ + u a₁/Q₁.
 //!
+//! All that holds where the place is like its cache points. Where these do not see a sub-path that the place sees, only the uniform share
+//! draws it, and the density is c₀, that of the uniform share alone. Nobody can say without shadow rays where that happens, but how
+//! often is known: it is the share π of their light that cache points would have missed by asking their neighbours instead. The variance
+//! is governed by the mean of the reciprocal density: 1/c becomes (1 − π)/c + π/c₀.
+//!
 //! A weight may use any Q that does not depend on the sub-paths it weighs: an estimate from earlier iterations. It need not be good for
 //! the result to be right; the ratios p/q are clamped from below so that a bad one costs a bounded variance.
 
@@ -31,6 +36,15 @@ pub struct Targets {
     pub unscattered: f32,
 }
 
+/// What there is at a place, as far as is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct There {
+    /// Q of both targets.
+    pub all: Targets,
+    /// π, the share of light that the cache points around would not know of.
+    pub missed: f32,
+}
+
 /// How connections are resampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resampled {
@@ -40,6 +54,8 @@ pub struct Resampled {
     pub second_stage: Option<f32>,
     /// Smallest p/q.
     pub epsilon: f32,
+    /// Smallest π: what is not known of what is not known.
+    pub doubt: f32,
     /// u.
     pub uniform: f32,
     /// L, an estimate; 0 if nothing is known yet.
@@ -49,23 +65,30 @@ pub struct Resampled {
 impl Resampled {
     /// c for a sub-path that brings `brings` to a place where there is `there`.
     #[inline]
-    pub fn factor(&self, brings: Targets, there: Targets) -> f32 {
+    pub fn factor(&self, brings: Targets, there: There) -> f32 {
         if self.vertices_per_path <= 0.0 || self.paths <= 1.0 {
             return 1.0;
         }
+        let There { all, missed } = there;
         let by_number = 1.0 / self.vertices_per_path;
-        // A defensive share that is spread over everything. Where no light is known of, all of the mixture is.
-        let mixed = |share: f32| match there.scattered > 0.0 {
-            true => (1.0 - self.uniform) * brings.scattered / there.scattered + self.uniform * share,
-            false => share,
-        };
         let p_over = |q_over_p: f32| (1.0 / q_over_p).clamp(self.epsilon, f32::MAX);
-        let p_over_q = match self.second_stage {
-            None => p_over(mixed(by_number)),
-            Some(m2) => {
-                let first = if there.unscattered > 0.0 { brings.unscattered / there.unscattered } else { by_number };
-                p_over(first) / m2 + (1.0 - 1.0 / m2) * p_over(mixed(first))
+        // The share that is spread over everything; where no light is known of, all of the mixture is.
+        let uniform = match self.second_stage {
+            Some(_) if all.unscattered > 0.0 => brings.unscattered / all.unscattered,
+            _ => by_number,
+        };
+        let (known, unknown) = match all.scattered > 0.0 {
+            true => {
+                let unknown = self.uniform * uniform;
+                ((1.0 - self.uniform) * brings.scattered / all.scattered + unknown, unknown)
             }
+            false => (uniform, uniform),
+        };
+        let missed = missed.max(self.doubt);
+        let last = (1.0 - missed) * p_over(known) + missed * p_over(unknown);
+        let p_over_q = match self.second_stage {
+            None => last,
+            Some(m2) => p_over(uniform) / m2 + (1.0 - 1.0 / m2) * last,
         };
         let m = 1.0 / self.paths;
         1.0 / (m + (1.0 - m) * p_over_q)
@@ -77,28 +100,38 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ONE_STAGE: Resampled =
-        Resampled { paths: 200.0, second_stage: None, epsilon: 1e-3, uniform: 0.25, vertices_per_path: 3.0 };
+    const ONE_STAGE: Resampled = Resampled {
+        paths: 200.0,
+        second_stage: None,
+        epsilon: 1e-3,
+        doubt: 0.0,
+        uniform: 0.25,
+        vertices_per_path: 3.0,
+    };
 
     fn lit(scattered: f32) -> Targets {
         Targets { scattered, unscattered: 0.0 }
+    }
+
+    fn there(scattered: f32) -> There {
+        There { all: lit(scattered), missed: 0.0 }
     }
 
     proptest! {
         #[test]
         fn one_path_is_not_resampled(a in 0.0f32..1e6, q in 0.0f32..1e6, l in 0.1f32..20.0) {
             let r = Resampled { paths: 1.0, vertices_per_path: l, ..ONE_STAGE };
-            prop_assert_eq!(r.factor(lit(a), lit(q)), 1.0);
-            prop_assert_eq!(Resampled { second_stage: Some(1.0), ..r }.factor(lit(a), lit(q)), 1.0);
+            prop_assert_eq!(r.factor(lit(a), there(q)), 1.0);
+            prop_assert_eq!(Resampled { second_stage: Some(1.0), ..r }.factor(lit(a), there(q)), 1.0);
         }
 
         #[test]
         fn factors_grow_with_light_and_stay_bounded(
-            a in 0.0f32..1e6, b in 0.0f32..1e6, q in 1e-6f32..1e6, m in 1.0f32..1e5, a1 in 0.0f32..1e6, q1 in 0.0f32..1e6, two: bool
+            a in 0.0f32..1e6, b in 0.0f32..1e6, q in 1e-6f32..1e6, m in 1.0f32..1e5, a1 in 0.0f32..1e6, q1 in 0.0f32..1e6, missed in 0.0f32..1.0, two: bool
         ) {
             let r = Resampled { paths: m, second_stage: two.then_some(m.sqrt()), ..ONE_STAGE };
             let brings = |scattered| Targets { scattered, unscattered: a1 };
-            let there = Targets { scattered: q, unscattered: q1 };
+            let there = There { all: Targets { scattered: q, unscattered: q1 }, missed };
             let (x, y) = (r.factor(brings(a.min(b)), there), r.factor(brings(a.max(b)), there));
             prop_assert!(x <= y && x >= 0.0 && y <= 1001.0);
         }
@@ -106,20 +139,34 @@ mod tests {
         /// A first stage that draws but one sub-path decides alone; one that draws very many decides nothing.
         #[test]
         fn two_stages_lie_between_their_targets(a in 1e-3f32..1e3, a1 in 1e-3f32..1e3) {
-            let (brings, there) = (Targets { scattered: a, unscattered: a1 }, Targets { scattered: 2.0, unscattered: 5.0 });
-            let r = |m2: f32| Resampled { uniform: 0.0, second_stage: Some(m2), ..ONE_STAGE }.factor(brings, there);
-            let first = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a1), lit(5.0));
-            let second = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a), lit(2.0));
+            let brings = Targets { scattered: a, unscattered: a1 };
+            let there_is = There { all: Targets { scattered: 2.0, unscattered: 5.0 }, missed: 0.0 };
+            let r = |m2: f32| Resampled { uniform: 0.0, second_stage: Some(m2), ..ONE_STAGE }.factor(brings, there_is);
+            let first = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a1), there(5.0));
+            let second = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a), there(2.0));
             prop_assert!((r(1.0) - first).abs() < 1e-4 * first);
             prop_assert!((r(1e9) - second).abs() < 1e-4 * second);
         }
     }
 
     #[test]
+    fn what_is_missed_counts_as_the_uniform_share() {
+        let (brings, at) = (lit(40.0), |missed| There { all: lit(2.0), missed });
+        let all_missed = ONE_STAGE.factor(brings, at(1.0));
+        assert!(
+            (all_missed - Resampled { uniform: 1.0, vertices_per_path: 12.0, ..ONE_STAGE }.factor(brings, at(0.0)))
+                .abs()
+                < 1e-6
+        );
+        let (none, half) = (ONE_STAGE.factor(brings, at(0.0)), ONE_STAGE.factor(brings, at(0.5)));
+        assert!((2.0 / half - 1.0 / none - 1.0 / all_missed).abs() < 1e-4);
+    }
+
+    #[test]
     fn many_paths_reach_the_target() {
         let r = Resampled { paths: 1e9, uniform: 0.0, ..ONE_STAGE };
-        assert!((r.factor(lit(6.0), lit(2.0)) - 3.0).abs() < 1e-5);
-        assert_eq!(Resampled { vertices_per_path: 0.0, ..r }.factor(lit(6.0), lit(2.0)), 1.0);
-        assert_eq!(r.factor(lit(5.0), lit(0.0)), Resampled { uniform: 1.0, ..r }.factor(lit(5.0), lit(2.0)));
+        assert!((r.factor(lit(6.0), there(2.0)) - 3.0).abs() < 1e-5);
+        assert_eq!(Resampled { vertices_per_path: 0.0, ..r }.factor(lit(6.0), there(2.0)), 1.0);
+        assert_eq!(r.factor(lit(5.0), there(0.0)), Resampled { uniform: 1.0, ..r }.factor(lit(5.0), there(2.0)));
     }
 }

@@ -7,7 +7,7 @@
 //! Densities of a vertex at infinity are per steradian of its direction; the disk that emission rays start on stands in for
 //! the direction's density at the next vertex (see `emit::sample`). [`Node::spread`] hides the difference.
 
-use super::Targets;
+use super::There;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 
 /// A vertex of one side.
@@ -29,8 +29,8 @@ pub struct Node {
     pub smooth: bool,
     /// Light side: c of the connection that ends at this vertex, see `mis::resampled`.
     pub factor: f32,
-    /// Eye side: Q of both targets at this vertex, on the side that the walk goes on to.
-    pub there: Targets,
+    /// Eye side: what is known of the light there is at this vertex, on the side that the walk goes on to.
+    pub there: There,
     /// Eye side: |cos| at this vertex between its surface's normal and the edge to the vertex before.
     pub cos: f32,
     /// Eye side: value of this vertex for a walk from the light, cosine weighted.
@@ -48,7 +48,7 @@ impl Node {
             ratio: 0.0,
             smooth: true,
             factor: 1.0,
-            there: Targets::default(),
+            there: There::default(),
             cos: 0.0,
             adjoint: Rgb::BLACK,
             reverse: 0.0,

@@ -9,7 +9,7 @@ use crate::integrators::replay::{Contribution, Replay};
 use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{Joint, Node, Side, Split, Targets, Weight, spread};
+use crate::mis::{Joint, Node, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment};
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
@@ -110,7 +110,7 @@ impl EyeHooks<'_, '_> {
                 record.light = LightStore::retrace(this, iteration, number);
             }
             let path = origin.map(|origin| record.path(origin, s, n_eye, lens));
-            let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(Targets::default(), |r| r.there(p, d));
+            let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(There::default(), |r| r.there(p, d));
             record.found(scene, weigher, &there, Contribution::new((s, t), pixel, raw, weight.own), path)
         });
         Found { x: pixel.0, y: pixel.1, path: 0, note, s: s as u16, t: t as u16, raw, weight }

@@ -5,7 +5,7 @@ use crate::emit::{EmissionSample, LensSample, LightEnd, LightId};
 use crate::integrators::replay::{Contribution, Replay};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{Joint, Node, Side, Split, Targets, Weight, spread};
+use crate::mis::{Joint, Node, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
@@ -156,7 +156,7 @@ impl LightHooks<'_, '_> {
         let (origin, resampler) = (self.out.origin, &self.this.resampler);
         let note = self.record.as_mut().map_or(0, |record| {
             let path = origin.map(|o| record.path(Origin { leaving, ..o }, s, 0, lens.p));
-            let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(Targets::default(), |r| r.there(p, d));
+            let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(There::default(), |r| r.there(p, d));
             record.found(scene, weigher, &there, Contribution::new((s, 1), (x, y), raw, weight.own), path)
         });
         let Some(queue) = &mut self.lens else { return };

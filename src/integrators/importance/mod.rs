@@ -68,6 +68,7 @@ fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> S
         neighbours: neighbours as usize,
         cache_fraction: records as f64 * 1e-5,
         epsilon: 1.0,
+        doubt: 0.0,
         weights: Weights::Balance,
     }
 }

@@ -6,14 +6,14 @@
 
 use crate::math::sampler::PathSampler;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
-use crate::mis::Targets;
+use crate::mis::{Targets, There};
 use crate::path::{Edge, Limits, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, Ray, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use crate::spatial::NearestPoints;
-use crate::spatial::nearest::facing;
+use crate::spatial::nearest::{MOST, facing};
 use crate::spatial::point_tree::Viewpoint;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -31,6 +31,9 @@ pub(super) struct Cache {
     pub ng: Vec3,
 }
 
+/// What a cache point found: the two targets (scattered first), and what it alone found of the first.
+pub(super) type Found = [f64; 3];
+
 /// A fixed set of cache points with their estimates.
 #[derive(Debug)]
 pub(in crate::integrators) struct Caches {
@@ -38,8 +41,10 @@ pub(in crate::integrators) struct Caches {
     ends: Vec<SegmentEnd>,
     /// Ranges of points.
     pub groups: Vec<Range<usize>>,
-    /// Sum over iterations of what each point found of the two targets (scattered first), and their number.
-    sums: Vec<[f64; 2]>,
+    /// For each point, three others of its group that are nearest: bits of their places in the group.
+    pub companions: Vec<u16>,
+    /// Sum over iterations of what each point found, and their number.
+    sums: Vec<Found>,
     iterations: u64,
 }
 
@@ -87,6 +92,17 @@ fn group(points: &mut [Cache], first: usize, groups: &mut Vec<Range<usize>>) {
 }
 
 impl Caches {
+    /// For each point, which three others of its group are nearest.
+    fn companions(points: &[Cache], groups: &[Range<usize>]) -> Vec<u16> {
+        let nearest = |group: &Range<usize>, own: usize| {
+            let mut others: Vec<usize> = group.clone().filter(|&i| i != own).collect();
+            let distance = |i: &usize| points[own].p.distance_squared(points[*i].p);
+            others.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+            others.iter().take(MOST).fold(0, |bits, i| bits | 1 << (i - group.start))
+        };
+        groups.iter().flat_map(|group| group.clone().map(move |own| nearest(group, own))).collect()
+    }
+
     /// The vertices of `fraction` times as many eye sub-paths as the full picture has pixels. With `by_group`, all neighbours of a
     /// place are of one group.
     pub fn new(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits, by_group: bool) -> (Caches, RayStats) {
@@ -107,7 +123,8 @@ impl Caches {
             false => NearestPoints::new(points, sides),
         };
         let ends = all.iter().map(|c| SegmentEnd::Surface { p: c.p, error: c.error, ng: c.ng }).collect();
-        (Caches { index, ends, groups, sums: vec![[0.0; 2]; all.len()], iterations: 0 }, stats)
+        let companions = Self::companions(&all, &groups);
+        (Caches { index, ends, groups, companions, sums: vec![[0.0; 3]; all.len()], iterations: 0 }, stats)
     }
 
     /// A cache point's end of a shadow ray.
@@ -130,34 +147,35 @@ impl Caches {
 
     /// Means over iterations so far of what the cache points around `p` whose side is `n` found.
     #[inline]
-    pub fn there(&self, p: Vec3, n: Vec3) -> Targets {
-        let (mut sum, mut count) = ([0.0; 2], 0.0);
+    pub fn there(&self, p: Vec3, n: Vec3) -> There {
+        let (mut sum, mut count) = ([0.0; 3], 0.0);
         for i in self.index.find(p, n) {
             let own = self.sums[i];
-            sum = [sum[0] + own[0], sum[1] + own[1]];
+            sum = std::array::from_fn(|k| sum[k] + own[k]);
             count += self.iterations as f64;
         }
         if count <= 0.0 {
-            return Targets::default();
+            return There::default();
         }
-        Targets { scattered: (sum[0] / count) as f32, unscattered: (sum[1] / count) as f32 }
+        let all = Targets { scattered: (sum[0] / count) as f32, unscattered: (sum[1] / count) as f32 };
+        There { all, missed: if sum[0] > 0.0 { (sum[2] / sum[0]) as f32 } else { 0.0 } }
     }
 
     /// Adds what an iteration found to the means.
-    pub fn learn<'a>(&mut self, found: impl Iterator<Item = &'a [f64; 2]>) {
+    pub fn learn<'a>(&mut self, found: impl Iterator<Item = &'a Found>) {
         for (sum, own) in self.sums.iter_mut().zip(found) {
-            *sum = [sum[0] + own[0], sum[1] + own[1]];
+            *sum = std::array::from_fn(|k| sum[k] + own[k]);
         }
         self.iterations += 1;
     }
 
     /// What must be saved to go on later: the sums, and the number of iterations behind them.
-    pub fn state(&self) -> (&[[f64; 2]], u64) {
+    pub fn state(&self) -> (&[Found], u64) {
         (&self.sums, self.iterations)
     }
 
     /// Goes on from a saved state; false if it is of other cache points.
-    pub fn restore(&mut self, sums: Vec<[f64; 2]>, iterations: u64) -> bool {
+    pub fn restore(&mut self, sums: Vec<Found>, iterations: u64) -> bool {
         let fits = sums.len() == self.sums.len();
         if fits {
             (self.sums, self.iterations) = (sums, iterations);

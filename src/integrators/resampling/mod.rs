@@ -75,6 +75,11 @@ const EPSILON: ParamSpec = ParamSpec {
     about: "smallest ratio of densities p/q that weights use, in millionths",
     default: ParamDefault::Int(1000, 1, 1_000_000),
 };
+const DOUBT: ParamSpec = ParamSpec {
+    name: "doubt",
+    about: "smallest share of light, in millionths, of which weights assume that the cache points around do not know it",
+    default: ParamDefault::Int(1000, 0, 1_000_000),
+};
 const SKIP: ParamSpec = sizing::parameter("auto");
 const fn weights(default: &'static str, choices: &'static [&'static str]) -> ParamSpec {
     ParamSpec {
@@ -85,14 +90,28 @@ const fn weights(default: &'static str, choices: &'static [&'static str]) -> Par
 }
 
 /// The parameters of methods with one stage; they differ in the weights they take by default.
-const fn one_stage(default_weights: &'static str) -> [ParamSpec; 12] {
+const fn one_stage(default_weights: &'static str) -> [ParamSpec; 13] {
     let weights = weights(default_weights, &["balance", "ris"]);
-    [MAX_DEPTH, RR_DEPTH, KEEP, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, NEIGHBOURS, CACHES, EPSILON, weights, SKIP]
+    [
+        MAX_DEPTH,
+        RR_DEPTH,
+        KEEP,
+        HIDE_EMITTERS,
+        TECHNIQUES,
+        PATHS,
+        SAMPLES,
+        NEIGHBOURS,
+        CACHES,
+        EPSILON,
+        DOUBT,
+        weights,
+        SKIP,
+    ]
 }
 
-const PCBPT_PARAMS: [ParamSpec; 12] = one_stage("balance");
-const RIS_PARAMS: [ParamSpec; 12] = one_stage("ris");
-const TWO_STAGE_PARAMS: [ParamSpec; 13] = [
+const PCBPT_PARAMS: [ParamSpec; 13] = one_stage("balance");
+const RIS_PARAMS: [ParamSpec; 13] = one_stage("ris");
+const TWO_STAGE_PARAMS: [ParamSpec; 14] = [
     MAX_DEPTH,
     RR_DEPTH,
     KEEP,
@@ -104,6 +123,7 @@ const TWO_STAGE_PARAMS: [ParamSpec; 13] = [
     NEIGHBOURS,
     GROUPED_CACHES,
     EPSILON,
+    DOUBT,
     weights("two-stage", &["balance", "ris", "two-stage"]),
     SKIP,
 ];
@@ -117,6 +137,7 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
         neighbours: params.int("neighbours") as usize,
         cache_fraction: params.int("caches") as f64 * 1e-5,
         epsilon: params.int("epsilon") as f32 * 1e-6,
+        doubt: params.int("doubt") as f32 * 1e-6,
         weights: match params.choice("weights") {
             "balance" => Weights::Balance,
             "ris" => Weights::OneStage,
@@ -216,6 +237,8 @@ pub(in crate::integrators) struct Settings {
     pub cache_fraction: f64,
     /// See [`Resampled::epsilon`](crate::mis::Resampled).
     pub epsilon: f32,
+    /// See [`Resampled::doubt`](crate::mis::Resampled).
+    pub doubt: f32,
     /// What weights know.
     pub weights: Weights,
 }

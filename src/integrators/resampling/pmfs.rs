@@ -10,7 +10,7 @@
 //!
 //! Shadow rays go out in packets, from all points of a group to one light vertex.
 
-use super::caches::Caches;
+use super::caches::{Caches, Found};
 use super::store::LightStore;
 use crate::math::hash::HashRng;
 use crate::prepared::PreparedScene;
@@ -44,8 +44,8 @@ pub(super) struct GroupPmf {
     /// For each cache point and entry, the sum of what the entries up to it bring, over the whole: cumulative probabilities. All zero
     /// where nothing is brought.
     cdf: Vec<f32>,
-    /// For each cache point, estimates of both normalisations Q.
-    found: Vec<[f64; 2]>,
+    /// For each cache point, what it found.
+    found: Vec<Found>,
     ranges: Vec<Range<usize>>,
 }
 
@@ -97,7 +97,7 @@ impl GroupPmf {
         self.cdf.clear();
         self.cdf.resize(group.len() * self.count, 0.0);
         self.found.clear();
-        self.found.resize(group.len(), [0.0; 2]);
+        self.found.resize(group.len(), [0.0; 3]);
         let (points, sides) = (&caches.index.points()[group.clone()], &caches.index.normals()[group.clone()]);
         for e in 0..self.count {
             let entry = self.entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, stands_for: 1.0 });
@@ -120,9 +120,12 @@ impl GroupPmf {
                 continue;
             }
             let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
-            for (i, &(c, brings)) in asked[..packet.len].iter().enumerate() {
-                if blocked >> i & 1 == 0 {
-                    self.cdf[c * self.count + e] = brings;
+            let seen = asked[..packet.len].iter().enumerate().filter(|(i, _)| blocked >> i & 1 == 0);
+            let by = seen.clone().fold(0u16, |by, (_, (c, _))| by | 1 << c);
+            for (_, &(c, brings)) in seen {
+                self.cdf[c * self.count + e] = brings;
+                if caches.companions[group.start + c] & by == 0 {
+                    self.found[c][2] += f64::from(brings);
                 }
             }
         }
@@ -188,7 +191,7 @@ impl Pmfs {
     }
 
     /// For every cache point, what this iteration says of its normalisations.
-    pub fn found(&self) -> impl Iterator<Item = &[f64; 2]> {
+    pub fn found(&self) -> impl Iterator<Item = &Found> {
         self.groups.iter().flat_map(|g| &g.found)
     }
 

@@ -156,7 +156,7 @@ impl Bidirectional {
         };
         self.prepare_caches(iteration, &mut RayStats::default());
         let words: Vec<f64> = words.map(f64::from_bits).collect();
-        let (sums, rest) = words.as_chunks::<2>();
+        let (sums, rest) = words.as_chunks::<3>();
         match &mut self.resampler {
             Some(resampler) => {
                 resampler.seen = [vertices, paths];

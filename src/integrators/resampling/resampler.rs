@@ -9,7 +9,7 @@ use super::{Scheme, Settings, Weights};
 use crate::integrators::bdpt::eye_path::Candidate;
 use crate::math::Vec3;
 use crate::math::hash::HashRng;
-use crate::mis::{Resampled, Targets, Weigher};
+use crate::mis::{Resampled, Targets, There, Weigher};
 use crate::shade::SurfacePoint;
 use crate::spatial::nearest::MOST;
 
@@ -52,12 +52,12 @@ impl Resampler {
         }
     }
 
-    /// Q of both targets at a point, on the side of the direction `d`.
+    /// What is known of the light at a point, on the side of the direction `d`.
     #[inline]
-    pub fn there(&self, point: &SurfacePoint, d: Vec3) -> Targets {
+    pub fn there(&self, point: &SurfacePoint, d: Vec3) -> There {
         match &self.caches {
             Some(caches) if self.settings.weights != Weights::Balance => caches.there(point.p, side(point, d)),
-            _ => Targets::default(),
+            _ => There::default(),
         }
     }
 
@@ -83,6 +83,7 @@ impl Resampler {
             paths: paths_counted as f32,
             second_stage: second_stage.map(|m2| m2 as f32),
             epsilon: self.settings.epsilon,
+            doubt: self.settings.doubt,
             uniform: 1.0 / (self.settings.neighbours + 1) as f32,
             vertices_per_path: if paths > 0 { (vertices as f64 / paths as f64) as f32 } else { 0.0 },
         })
