@@ -21,6 +21,11 @@ use std::ops::Range;
 /// The random stream of the eye sub-paths that make cache points.
 const CACHE_STREAM: u64 = 4;
 
+/// Radii of a group beyond which its points say nothing about visibility.
+const FAR: f32 = 3.0;
+/// What surfaces at right angles may miss of each other's light.
+const TILT: f32 = 0.25;
+
 /// A cache point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cache {
@@ -43,6 +48,8 @@ pub(in crate::integrators) struct Caches {
     pub groups: Vec<Range<usize>>,
     /// For each point, three others of its group that are nearest: bits of their places in the group.
     pub companions: Vec<u16>,
+    /// For each point one over the squared distance at which nothing is like there any more.
+    unlike_at: Vec<f32>,
     /// Sum over iterations of what each point found, and their number.
     sums: Vec<Found>,
     iterations: u64,
@@ -124,7 +131,14 @@ impl Caches {
         };
         let ends = all.iter().map(|c| SegmentEnd::Surface { p: c.p, error: c.error, ng: c.ng }).collect();
         let companions = Self::companions(&all, &groups);
-        (Caches { index, ends, groups, companions, sums: vec![[0.0; 3]; all.len()], iterations: 0 }, stats)
+        let unlike_at = groups.iter().flat_map(|group| {
+            let centre = all[group.clone()].iter().map(|c| c.p).sum::<Vec3>() / group.len() as f32;
+            let sum: f32 = all[group.clone()].iter().map(|c| c.p.distance_squared(centre)).sum();
+            let far = FAR * FAR * sum / group.len() as f32;
+            std::iter::repeat_n((1.0 / far).min(f32::MAX), group.len())
+        });
+        let unlike_at = unlike_at.collect();
+        (Caches { index, ends, groups, companions, unlike_at, sums: vec![[0.0; 3]; all.len()], iterations: 0 }, stats)
     }
 
     /// A cache point's end of a shadow ray.
@@ -148,17 +162,20 @@ impl Caches {
     /// Means over iterations so far of what the cache points around `p` whose side is `n` found.
     #[inline]
     pub fn there(&self, p: Vec3, n: Vec3) -> There {
-        let (mut sum, mut count) = ([0.0; 3], 0.0);
+        let (mut sum, mut count, mut unlike) = ([0.0; 3], 0.0, 1.0f32);
         for i in self.index.find(p, n) {
             let own = self.sums[i];
             sum = std::array::from_fn(|k| sum[k] + own[k]);
             count += self.iterations as f64;
+            let (q, m) = (self.index.points()[i], self.index.normals()[i]);
+            unlike = unlike.min(p.distance_squared(q) * self.unlike_at[i] + TILT * (1.0 - n.dot(m)));
         }
         if count <= 0.0 {
             return There::default();
         }
         let all = Targets { scattered: (sum[0] / count) as f32, unscattered: (sum[1] / count) as f32 };
-        There { all, missed: if sum[0] > 0.0 { (sum[2] / sum[0]) as f32 } else { 0.0 } }
+        let missed = if sum[0] > 0.0 { (sum[2] / sum[0]) as f32 } else { 0.0 };
+        There { all, missed: missed.max(unlike) }
     }
 
     /// Adds what an iteration found to the means.

@@ -44,7 +44,7 @@ const RR_DEPTH: ParamSpec = ParamSpec { default: ParamDefault::Int(1, 1, 1_000_0
 const KEEP: ParamSpec = ParamSpec {
     name: "keep",
     about: "percent of an eye sub-path's survival of Russian roulette where it has been connected: lower, more of them end early",
-    default: ParamDefault::Int(100, 1, 100),
+    default: ParamDefault::Int(30, 1, 100),
 };
 const FIRST_STAGE: ParamSpec = ParamSpec {
     name: "paths",
@@ -69,7 +69,7 @@ const CACHES: ParamSpec = ParamSpec {
     default: ParamDefault::Int(400, 0, 100_000),
 };
 /// Groups share their first stage and have but few vertices to ask for: they may be denser.
-const GROUPED_CACHES: ParamSpec = ParamSpec { default: ParamDefault::Int(1600, 0, 100_000), ..CACHES };
+const GROUPED_CACHES: ParamSpec = ParamSpec { default: ParamDefault::Int(2000, 0, 100_000), ..CACHES };
 const EPSILON: ParamSpec = ParamSpec {
     name: "epsilon",
     about: "smallest ratio of densities p/q that weights use, in millionths",
@@ -78,7 +78,7 @@ const EPSILON: ParamSpec = ParamSpec {
 const DOUBT: ParamSpec = ParamSpec {
     name: "doubt",
     about: "smallest share of light, in millionths, of which weights assume that the cache points around do not know it",
-    default: ParamDefault::Int(1000, 0, 1_000_000),
+    default: ParamDefault::Int(20_000, 0, 1_000_000),
 };
 const SKIP: ParamSpec = sizing::parameter("auto");
 const fn weights(default: &'static str, choices: &'static [&'static str]) -> ParamSpec {
