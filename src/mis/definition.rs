@@ -106,7 +106,11 @@ pub fn densities(
                 unscattered: luminance(arriving) * v.point.ng.dot(to).abs(),
             };
             arriving = scattered.map(|v| v / scatter(i - 1, from, to, true));
-            *factor = f64::from(resampled.factor(brings, there(&path.interior[i - 1].point, -to)));
+            *factor = f64::from(resampled.factor(
+                brings,
+                path.edge(i - 1).1.powi(2),
+                there(&path.interior[i - 1].point, -to),
+            ));
         }
     }
     Densities { light: from_light, eye: from_eye, joinable, next_event, factors }

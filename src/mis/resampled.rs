@@ -23,6 +23,10 @@
 //! often is known: it is the share π of their light that cache points would have missed by asking their neighbours instead. The variance
 //! is governed by the mean of the reciprocal density: 1/c becomes (1 − π)/c + π/c₀.
 //!
+//! Nor do cache points see the 1/d² of a light vertex that is nearer to the place than they are to each other: their
+//! probability is about that at d² + r², r being their distance, and so must the density be. Else such vertices, drawn as rarely as
+//! their neighbours, would get all of the weight.
+//!
 //! A weight may use any Q that does not depend on the sub-paths it weighs: an estimate from earlier iterations. It need not be good for
 //! the result to be right; the ratios p/q are clamped from below so that a bad one costs a bounded variance.
 
@@ -43,6 +47,8 @@ pub struct There {
     pub all: Targets,
     /// π, the share of light that the cache points around would not know of.
     pub missed: f32,
+    /// Square of the distance to which these cache points see alike.
+    pub blur2: f32,
 }
 
 /// How connections are resampled.
@@ -63,13 +69,15 @@ pub struct Resampled {
 }
 
 impl Resampled {
-    /// c for a sub-path that brings `brings` to a place where there is `there`.
+    /// c for a sub-path that brings `brings` to a place where there is `there`; its last vertex is at the squared distance `distance2`.
     #[inline]
-    pub fn factor(&self, brings: Targets, there: There) -> f32 {
+    pub fn factor(&self, brings: Targets, distance2: f32, there: There) -> f32 {
         if self.vertices_per_path <= 0.0 || self.paths <= 1.0 {
             return 1.0;
         }
-        let There { all, missed } = there;
+        let There { all, missed, blur2 } = there;
+        let blur = if blur2 > 0.0 { distance2 / (distance2 + blur2) } else { 1.0 };
+        let brings = Targets { scattered: brings.scattered * blur, unscattered: brings.unscattered * blur };
         let by_number = 1.0 / self.vertices_per_path;
         let p_over = |q_over_p: f32| (1.0 / q_over_p).clamp(self.epsilon, f32::MAX);
         // The share that is spread over everything; where no light is known of, all of the mixture is.
@@ -114,15 +122,15 @@ mod tests {
     }
 
     fn there(scattered: f32) -> There {
-        There { all: lit(scattered), missed: 0.0 }
+        There { all: lit(scattered), ..There::default() }
     }
 
     proptest! {
         #[test]
         fn one_path_is_not_resampled(a in 0.0f32..1e6, q in 0.0f32..1e6, l in 0.1f32..20.0) {
             let r = Resampled { paths: 1.0, vertices_per_path: l, ..ONE_STAGE };
-            prop_assert_eq!(r.factor(lit(a), there(q)), 1.0);
-            prop_assert_eq!(Resampled { second_stage: Some(1.0), ..r }.factor(lit(a), there(q)), 1.0);
+            prop_assert_eq!(r.factor(lit(a), 1.0, there(q)), 1.0);
+            prop_assert_eq!(Resampled { second_stage: Some(1.0), ..r }.factor(lit(a), 1.0, there(q)), 1.0);
         }
 
         #[test]
@@ -131,8 +139,8 @@ mod tests {
         ) {
             let r = Resampled { paths: m, second_stage: two.then_some(m.sqrt()), ..ONE_STAGE };
             let brings = |scattered| Targets { scattered, unscattered: a1 };
-            let there = There { all: Targets { scattered: q, unscattered: q1 }, missed };
-            let (x, y) = (r.factor(brings(a.min(b)), there), r.factor(brings(a.max(b)), there));
+            let there = There { all: Targets { scattered: q, unscattered: q1 }, missed, blur2: 0.5 };
+            let (x, y) = (r.factor(brings(a.min(b)), 1.0, there), r.factor(brings(a.max(b)), 1.0, there));
             prop_assert!(x <= y && x >= 0.0 && y <= 1001.0);
         }
 
@@ -140,10 +148,10 @@ mod tests {
         #[test]
         fn two_stages_lie_between_their_targets(a in 1e-3f32..1e3, a1 in 1e-3f32..1e3) {
             let brings = Targets { scattered: a, unscattered: a1 };
-            let there_is = There { all: Targets { scattered: 2.0, unscattered: 5.0 }, missed: 0.0 };
-            let r = |m2: f32| Resampled { uniform: 0.0, second_stage: Some(m2), ..ONE_STAGE }.factor(brings, there_is);
-            let first = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a1), there(5.0));
-            let second = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a), there(2.0));
+            let there_is = There { all: Targets { scattered: 2.0, unscattered: 5.0 }, ..There::default() };
+            let r = |m2: f32| Resampled { uniform: 0.0, second_stage: Some(m2), ..ONE_STAGE }.factor(brings, 1.0, there_is);
+            let first = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a1), 1.0, there(5.0));
+            let second = Resampled { uniform: 0.0, ..ONE_STAGE }.factor(lit(a), 1.0, there(2.0));
             prop_assert!((r(1.0) - first).abs() < 1e-4 * first);
             prop_assert!((r(1e9) - second).abs() < 1e-4 * second);
         }
@@ -151,22 +159,36 @@ mod tests {
 
     #[test]
     fn what_is_missed_counts_as_the_uniform_share() {
-        let (brings, at) = (lit(40.0), |missed| There { all: lit(2.0), missed });
-        let all_missed = ONE_STAGE.factor(brings, at(1.0));
+        let (brings, at) = (lit(40.0), |missed| There { all: lit(2.0), missed, blur2: 0.0 });
+        let all_missed = ONE_STAGE.factor(brings, 1.0, at(1.0));
         assert!(
-            (all_missed - Resampled { uniform: 1.0, vertices_per_path: 12.0, ..ONE_STAGE }.factor(brings, at(0.0)))
-                .abs()
+            (all_missed
+                - Resampled { uniform: 1.0, vertices_per_path: 12.0, ..ONE_STAGE }.factor(brings, 1.0, at(0.0)))
+            .abs()
                 < 1e-6
         );
-        let (none, half) = (ONE_STAGE.factor(brings, at(0.0)), ONE_STAGE.factor(brings, at(0.5)));
+        let (none, half) = (ONE_STAGE.factor(brings, 1.0, at(0.0)), ONE_STAGE.factor(brings, 1.0, at(0.5)));
         assert!((2.0 / half - 1.0 / none - 1.0 / all_missed).abs() < 1e-4);
+    }
+
+    #[test]
+    fn near_vertices_are_seen_from_afar() {
+        let at = There { all: lit(2.0), missed: 0.0, blur2: 1.0 };
+        // A light of 1/d² that is twice as near brings four times as much, of which cache points know little.
+        let far = ONE_STAGE.factor(lit(1e-4), 1e4, at);
+        assert!((far - ONE_STAGE.factor(lit(1e-4), 1e4, there(2.0))).abs() < 1e-3 * far);
+        let [near, nearer] = [1e-2f32, 1e-4].map(|d2| ONE_STAGE.factor(lit(1.0 / d2), d2, at));
+        assert!((near - nearer).abs() < 0.02 * near, "{near} {nearer}");
     }
 
     #[test]
     fn many_paths_reach_the_target() {
         let r = Resampled { paths: 1e9, uniform: 0.0, ..ONE_STAGE };
-        assert!((r.factor(lit(6.0), there(2.0)) - 3.0).abs() < 1e-5);
-        assert_eq!(Resampled { vertices_per_path: 0.0, ..r }.factor(lit(6.0), there(2.0)), 1.0);
-        assert_eq!(r.factor(lit(5.0), there(0.0)), Resampled { uniform: 1.0, ..r }.factor(lit(5.0), there(2.0)));
+        assert!((r.factor(lit(6.0), 1.0, there(2.0)) - 3.0).abs() < 1e-5);
+        assert_eq!(Resampled { vertices_per_path: 0.0, ..r }.factor(lit(6.0), 1.0, there(2.0)), 1.0);
+        assert_eq!(
+            r.factor(lit(5.0), 1.0, there(0.0)),
+            Resampled { uniform: 1.0, ..r }.factor(lit(5.0), 1.0, there(2.0))
+        );
     }
 }

@@ -33,6 +33,8 @@ pub struct Node {
     pub there: There,
     /// Eye side: |cos| at this vertex between its surface's normal and the edge to the vertex before.
     pub cos: f32,
+    /// Eye side: square of the distance to the vertex before.
+    pub distance2: f32,
     /// Eye side: value of this vertex for a walk from the light, cosine weighted.
     pub adjoint: Rgb,
     /// Eye side: density per steradian with which a walk from the light would go on from here to the vertex before.
@@ -50,6 +52,7 @@ impl Node {
             factor: 1.0,
             there: There::default(),
             cos: 0.0,
+            distance2: 0.0,
             adjoint: Rgb::BLACK,
             reverse: 0.0,
         }

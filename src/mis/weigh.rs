@@ -172,7 +172,7 @@ impl Weigher {
         if n < 2 {
             return 1.0;
         }
-        resampled.factor(brings, eye[n - 1].there)
+        resampled.factor(brings, node.distance2, eye[n - 1].there)
     }
 
     /// The weight of the technique that sampled the path, and of kinds of techniques.

@@ -269,7 +269,7 @@ impl EyeHooks<'_, '_> {
                 scattered: scattered.luminance() * spread_z,
                 unscattered: light.throughput.luminance() * y.ng.dot(to_light).abs() * spread_z,
             };
-            resampler.factor(&self.this.weigher, brings, z, to_light)
+            resampler.factor(&self.this.weigher, (brings, dist2), z, to_light)
         });
         let split = Split {
             light: to.nodes,
@@ -308,7 +308,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
             self.this.weigher.light_limits.roulette(vertex.bsdf),
         );
         if let Some(node) = self.side.last_mut() {
-            node.cos = cos.abs();
+            (node.cos, node.distance2) = (cos.abs(), dist2);
         }
         if let Some(record) = &mut self.record {
             record.vertex(true, vertex);

@@ -304,7 +304,7 @@ impl WalkHooks for LightHooks<'_, '_> {
                     scattered: vertex.throughput.luminance() * forward.0,
                     unscattered: self.luminance_before * self.cos_leaving.abs() * spread(cos, dist2),
                 };
-                node.factor = resampler.factor(&self.this.weigher, brings, point, vertex.wo);
+                node.factor = resampler.factor(&self.this.weigher, (brings, dist2), point, vertex.wo);
             }
         }
         if let Some(record) = &mut self.record {

@@ -162,12 +162,13 @@ impl Caches {
     /// Means over iterations so far of what the cache points around `p` whose side is `n` found.
     #[inline]
     pub fn there(&self, p: Vec3, n: Vec3) -> There {
-        let (mut sum, mut count, mut unlike) = ([0.0; 3], 0.0, 1.0f32);
+        let (mut sum, mut count, mut unlike, mut blur2) = ([0.0; 3], 0.0, 1.0f32, 0.0f32);
         for i in self.index.find(p, n) {
             let own = self.sums[i];
             sum = std::array::from_fn(|k| sum[k] + own[k]);
             count += self.iterations as f64;
             let (q, m) = (self.index.points()[i], self.index.normals()[i]);
+            blur2 = blur2.max(1.0 / (self.unlike_at[i] * (FAR * FAR)));
             unlike = unlike.min(p.distance_squared(q) * self.unlike_at[i] + TILT * (1.0 - n.dot(m)));
         }
         if count <= 0.0 {
@@ -175,7 +176,7 @@ impl Caches {
         }
         let all = Targets { scattered: (sum[0] / count) as f32, unscattered: (sum[1] / count) as f32 };
         let missed = if sum[0] > 0.0 { (sum[2] / sum[0]) as f32 } else { 0.0 };
-        There { all, missed: missed.max(unlike) }
+        There { all, missed: missed.max(unlike), blur2 }
     }
 
     /// Adds what an iteration found to the means.

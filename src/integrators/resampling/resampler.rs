@@ -61,12 +61,18 @@ impl Resampler {
         }
     }
 
-    /// c of a sub-path that brings `brings` to a point from the direction `from`.
+    /// c of a sub-path that brings the first to a point from the direction `from`, from a squared distance.
     #[inline]
-    pub fn factor(&self, weigher: &Weigher, brings: Targets, point: &SurfacePoint, from: Vec3) -> f32 {
+    pub fn factor(
+        &self,
+        weigher: &Weigher,
+        (brings, distance2): (Targets, f32),
+        point: &SurfacePoint,
+        from: Vec3,
+    ) -> f32 {
         match &weigher.resampled {
             None => 1.0,
-            Some(resampled) => resampled.factor(brings, self.there(point, from)),
+            Some(resampled) => resampled.factor(brings, distance2, self.there(point, from)),
         }
     }
 
