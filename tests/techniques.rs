@@ -71,7 +71,6 @@ fn each_technique_alone_makes_the_same_picture() {
         (&resampling::RIS, few),
         (&resampling::PCBPT, many),
         (&resampling::TWO_STAGE, two),
-        (&importance::SKELETON, &[("paths", "100")]),
         (&importance::IC_BDPT, &[("paths", "100"), ("records", "50000")]),
     ] {
         techniques_agree(spec, params);

@@ -35,7 +35,7 @@ pub struct Limits {
     pub max_edges: u32,
     /// Vertex index from which Russian roulette is played; the first hit is 1.
     pub roulette_from: u32,
-    /// Where roulette is played and the vertex can be connected to, survival is lower by this factor.
+    /// Where roulette is played and the vertex is matt, survival is lower by this factor.
     pub keep: f32,
 }
 
@@ -59,7 +59,7 @@ impl Limits {
     #[inline]
     pub fn roulette(&self, bsdf: &Bsdf) -> f32 {
         let survival = survival(bsdf);
-        if self.keep < 1.0 && bsdf.connectable() { survival * self.keep } else { survival }
+        if self.keep < 1.0 && bsdf.is_lambertian() { survival * self.keep } else { survival }
     }
 }
 

@@ -258,7 +258,7 @@ mod tests {
         let range = 7..29;
         let total: f64 = weights[range.clone()].iter().map(|w| f64::from(*w)).sum();
         const N: u32 = 100_000;
-        let mut counts = vec![0u32; 40];
+        let mut counts = [0u32; 40];
         for i in 0..N {
             let (at, p) = tree.draw(&range, (i as f32 + 0.5) / N as f32).unwrap();
             assert!((p - f64::from(weights[at]) / total).abs() < 1e-12);

@@ -43,7 +43,7 @@ const PATHS: ParamSpec = ParamSpec {
 const RR_DEPTH: ParamSpec = ParamSpec { default: ParamDefault::Int(1, 1, 1_000_000), ..super::bdpt::RR_DEPTH };
 const KEEP: ParamSpec = ParamSpec {
     name: "keep",
-    about: "percent of an eye sub-path's survival of Russian roulette where it has been connected: lower, more of them end early",
+    about: "percent of an eye sub-path's survival of Russian roulette on matt surfaces, where connections find all light: lower, more of them end early",
     default: ParamDefault::Int(30, 1, 100),
 };
 const FIRST_STAGE: ParamSpec = ParamSpec {

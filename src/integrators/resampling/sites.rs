@@ -29,7 +29,7 @@ pub(super) struct Sites {
 
 #[derive(Debug)]
 enum Finder {
-    Nearest(NearestPoints),
+    Nearest(Box<NearestPoints>),
     Nodes {
         skeleton: Box<Skeleton>,
         /// For each node its number among the sites.
@@ -46,7 +46,7 @@ impl Sites {
         let normals: Vec<Vec3> = all.iter().map(|c| c.side).collect();
         let index = NearestPoints::new(all.iter().map(|c| c.p).collect(), normals.clone());
         let ends = all.iter().map(|c| SegmentEnd::Surface { p: c.p, error: c.error, ng: c.ng }).collect();
-        (Sites { ends, normals: Some(normals), finder: Finder::Nearest(index) }, stats)
+        (Sites { ends, normals: Some(normals), finder: Finder::Nearest(Box::new(index)) }, stats)
     }
 
     /// Nodes of the skeleton that more than `acceptance` times the mean number of eye vertices belong to.

@@ -354,6 +354,12 @@ impl Bsdf {
         Rgb::new(front.r.max(back.r), front.g.max(back.g), front.b.max(back.b)).map(|c| c.min(1.0))
     }
 
+    /// It scatters as a matt surface does, and in no other way.
+    #[inline]
+    pub fn is_lambertian(&self) -> bool {
+        self.lambert.is_some()
+    }
+
     /// True if a connection to this point can carry light: some lobe is not a delta.
     #[inline]
     pub fn connectable(&self) -> bool {

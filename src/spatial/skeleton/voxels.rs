@@ -277,8 +277,8 @@ mod tests {
                     }
                 }
             });
-            for i in 0..grid.len() {
-                assert!(near[i] || !grid.solid[i] || grid.is_rim(grid.place(i)), "{:?} is far from all", grid.place(i));
+            for (i, near) in near.iter().enumerate() {
+                assert!(*near || !grid.solid[i] || grid.is_rim(grid.place(i)), "{:?} is far from all", grid.place(i));
             }
         }
     }

@@ -1,0 +1,54 @@
+//! Resampled connections agree with the path tracer whatever their parameters are: few or many light sub-paths, no cache points or
+//! three, one vertex in the second stage or all, any weights.
+
+#[path = "scenes/gallery.rs"]
+mod gallery;
+#[allow(dead_code, reason = "tests share what not each of them needs")]
+mod scenes;
+
+use gallery::{GALLERY, exhibit};
+use lightsieve::integrators::{IntegratorSpec, importance, path, resampling};
+use lightsieve::ray::Backend;
+use scenes::{Picture, prepare};
+
+const SPP: u64 = 32;
+
+#[test]
+fn parameters_do_not_change_the_expectation() {
+    let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 16] = [
+        (ris, &[("paths", "1")]),
+        (ris, &[("paths", "2"), ("neighbours", "1")]),
+        (ris, &[("paths", "200"), ("neighbours", "0")]),
+        (ris, &[("weights", "balance"), ("keep", "100")]),
+        (ris, &[("doubt", "0"), ("keep", "100"), ("skip", "never")]),
+        (ris, &[("epsilon", "1000000"), ("doubt", "1000000")]),
+        (two, &[("second_stage", "1")]),
+        (two, &[("second_stage", "16"), ("neighbours", "1"), ("samples", "3")]),
+        (two, &[("paths", "200"), ("second_stage", "200"), ("skip", "never")]),
+        (two, &[("paths", "300"), ("second_stage", "16"), ("neighbours", "0")]),
+        (two, &[("paths", "1"), ("second_stage", "1"), ("keep", "60")]),
+        (two, &[("weights", "ris"), ("second_stage", "8")]),
+        (two, &[("weights", "balance"), ("second_stage", "8")]),
+        (&importance::SKELETON, &[("acceptance", "0"), ("cells", "30")]),
+        (&importance::SKELETON, &[("paths", "7"), ("skip", "never")]),
+        (&importance::IC_BDPT, &[("paths", "7"), ("neighbours", "1")]),
+    ];
+    // Diffuse and glossy; lit from everywhere; by lights that have no size.
+    let shown = ["room", "environment", "delta-lights", "principled"];
+    for name in GALLERY.into_iter().filter(|name| shown.contains(name)) {
+        let scene = prepare(exhibit(name), Backend::default_available(), None);
+        let reference = Picture::render(&path::SPEC, &scene, &[], SPP, 900);
+        for (spec, params) in variants {
+            // A film of 64 pixels needs more than its share of places.
+            let places = match spec.name {
+                "skeleton" => None,
+                "ic-bdpt" => Some(("records", "20000")),
+                _ => Some(("caches", "20000")),
+            };
+            let params: Vec<(&str, &str)> = params.iter().copied().chain(places).collect();
+            let picture = Picture::render(spec, &scene, &params, SPP, 930);
+            picture.assert_agrees(&reference, 0.0, &format!("{} {params:?}: {name}", spec.name));
+        }
+    }
+}
