@@ -7,7 +7,7 @@ mod scenes;
 
 use gallery::{GALLERY, exhibit, file};
 use glam::{DMat4, DVec3, EulerRot};
-use lightsieve::integrators::path;
+use lightsieve::integrators::{importance, path};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
 use lightsieve::scene::{SceneDesc, ShapeDesc};
@@ -57,7 +57,7 @@ fn every_integrator_agrees_with_the_path_tracer() {
     for name in GALLERY {
         let scene = prepared(exhibit(name));
         let reference = Picture::render(&path::SPEC, &scene, &[("heuristic", "power")], SPP, 100);
-        for spec in unbiased().filter(|s| takes(s, &scene)) {
+        for spec in unbiased().chain([&importance::IMPORTANCE_CACHING]).filter(|s| takes(s, &scene)) {
             for heuristic in ["balance", "power"] {
                 if heuristic == "power" && spec.params.iter().all(|p| p.name != "heuristic") {
                     continue;

@@ -387,8 +387,11 @@ fn other_pixels_of_a_texture_are_another_scene() {
 fn a_crop_is_a_part_of_the_whole() {
     let sandbox = Sandbox::new();
     for i in integrators() {
-        render(&sandbox, &format!("-i {i} -o whole.pfm --size 40x24"));
-        render(&sandbox, &format!("-i {i} -o part.pfm --size 40x24 --crop 9,5,20,11"));
+        // A part of the picture may be worth other numbers of samples than the whole.
+        let listed = sandbox.run(&format!("list -i {i}")).expect(0, &[]).stdout;
+        let skip = if listed.contains("  skip ") { "-p skip=never" } else { "" };
+        render(&sandbox, &format!("-i {i} {skip} -o whole.pfm --size 40x24"));
+        render(&sandbox, &format!("-i {i} {skip} -o part.pfm --size 40x24 --crop 9,5,20,11"));
         let (whole, part) = (image(&sandbox, "whole.pfm"), image(&sandbox, "part.pfm"));
         assert_eq!((part.width, part.height), (20, 11));
         for y in 0..11 {

@@ -46,7 +46,8 @@ fn parameters_do_not_change_the_expectation() {
                 "ic-bdpt" => Some(("records", "20000")),
                 _ => Some(("caches", "20000")),
             };
-            let params: Vec<(&str, &str)> = params.iter().copied().chain(places).collect();
+            let params: Vec<(&str, &str)> =
+                [("skip", "auto"), ("keep", "30")].into_iter().chain(places).chain(params.iter().copied()).collect();
             let picture = Picture::render(spec, &scene, &params, SPP, 930);
             picture.assert_agrees(&reference, 0.0, &format!("{} {params:?}: {name}", spec.name));
         }

@@ -68,6 +68,32 @@ pub(crate) struct SceneArgs {
     pub camera_fov: Option<f64>,
 }
 
+/// Which samples: those that are rendered, or one of them to be replayed.
+#[derive(Debug, Args)]
+pub(crate) struct WhatArgs {
+    /// Integrator (see `lightsieve list`)
+    #[arg(short, long, value_name = "NAME")]
+    pub integrator: Option<String>,
+    /// Parameter of the integrator
+    #[arg(short, long, value_name = "KEY=VALUE", value_parser = pair)]
+    pub param: Vec<(String, String)>,
+    /// Seed
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Picture size instead of the scene's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Only this part is rendered, in pixels of the full picture
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
+    pub crop: Option<[u32; 4]>,
+    /// Largest number of edges of a path; short for -p max_depth=N
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub max_depth: Option<i64>,
+    /// Ray-query backend
+    #[arg(long, value_name = "BACKEND", value_enum)]
+    pub query: Option<Query>,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
     #[command(flatten)]
@@ -75,12 +101,8 @@ pub(crate) struct RenderArgs {
     /// Output image: .exr (linear, all layers), .pfm (linear) or .png (sRGB); may be given several times
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Integrator (see `lightsieve list`)
-    #[arg(short, long, value_name = "NAME")]
-    pub integrator: Option<String>,
-    /// Parameter of the integrator
-    #[arg(short, long, value_name = "KEY=VALUE", value_parser = pair)]
-    pub param: Vec<(String, String)>,
+    #[command(flatten)]
+    pub what: WhatArgs,
     /// Samples per pixel (iterations)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub spp: Option<u64>,
@@ -91,24 +113,9 @@ pub(crate) struct RenderArgs {
     /// their own, whose difference tells
     #[arg(long, value_name = "MEASURE=VALUE", value_parser = ErrorTarget::parse, conflicts_with_all = ["checkpoint", "resume", "pyramid"])]
     pub error_target: Option<ErrorTarget>,
-    /// Seed
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
     /// Threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
-    /// Picture size instead of the scene's
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    pub size: Option<[u32; 2]>,
-    /// Render only this part, in pixels of the full picture
-    #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
-    pub crop: Option<[u32; 4]>,
-    /// Largest number of edges of a path; short for -p max_depth=N
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    pub max_depth: Option<i64>,
-    /// Ray-query backend
-    #[arg(long, value_name = "BACKEND", value_enum)]
-    pub query: Option<Query>,
     /// Exposure of PNG output in stops
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
@@ -148,27 +155,8 @@ pub(crate) struct ReplayArgs {
     /// Iteration, from zero
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub iteration: u64,
-    /// Integrator (see `lightsieve list`)
-    #[arg(short, long, value_name = "NAME")]
-    pub integrator: Option<String>,
-    /// Parameter of the integrator
-    #[arg(short, long, value_name = "KEY=VALUE", value_parser = pair)]
-    pub param: Vec<(String, String)>,
-    /// Seed
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
-    /// Picture size instead of the scene's
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    pub size: Option<[u32; 2]>,
-    /// The part that was rendered, in pixels of the full picture
-    #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
-    pub crop: Option<[u32; 4]>,
-    /// Largest number of edges of a path; short for -p max_depth=N
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    pub max_depth: Option<i64>,
-    /// Ray-query backend
-    #[arg(long, value_name = "BACKEND", value_enum)]
-    pub query: Option<Query>,
+    #[command(flatten)]
+    pub what: WhatArgs,
 }
 
 #[derive(Debug, Args)]

@@ -24,8 +24,13 @@ const DEFAULT_SPP: u64 = 64;
 
 impl Config {
     pub fn resolve(args: &RenderArgs, desc: &SceneDesc, diagnostics: &mut Diagnostics) -> Result<Config, Failure> {
-        let (spec, params) =
-            Config::of_integrator(args.integrator.as_deref(), args.max_depth, &args.param, desc, diagnostics)?;
+        let (spec, params) = Config::of_integrator(
+            args.what.integrator.as_deref(),
+            args.what.max_depth,
+            &args.what.param,
+            desc,
+            diagnostics,
+        )?;
         let file_spp = desc.sensors.first().and_then(|s| s.sample_count).map(u64::from);
         // A time or an error to reach replaces the scene's number of samples.
         let iterations = match (args.spp, args.time.is_some() || args.error_target.is_some()) {
@@ -100,7 +105,7 @@ impl Config {
         if let Some(target) = &args.error_target {
             out!("error_target = {}={}", target.key, target.value);
         }
-        out!("seed = {}", args.seed);
+        out!("seed = {}", args.what.seed);
         out!("threads = {}", self.threads);
     }
 }

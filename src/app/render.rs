@@ -51,10 +51,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let textures = desc.textures.len();
     let mut clock = Clock::default();
     let options = PrepareOptions {
-        backend: Query::backend(args.query),
+        backend: Query::backend(args.what.query),
         threads: config.threads,
-        size: args.size,
-        crop: args.crop,
+        size: args.what.size,
+        crop: args.what.crop,
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(config.threads).build().map_err(Failure::input)?;
     let prepared = clock.time(|| pool.install(|| PreparedScene::build(desc, &options, &mut diagnostics)));
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
 
     let params = config.params.pairs();
     let identity = (args.checkpoint.is_some() || args.resume.is_some())
-        .then(|| Checkpoint::new(&scene, config.spec.name, &params, args.seed));
+        .then(|| Checkpoint::new(&scene, config.spec.name, &params, args.what.seed));
     let (mut film, state) = match (&args.resume, &identity) {
         (Some(path), Some(identity)) => identity.load(path).map_err(checkpoint_failure)?,
         _ => (Film::new(scene.window), vec![]),
@@ -87,7 +87,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let mut last_checkpoint = Instant::now();
     let mut trouble = None;
     let mut integrator = (config.spec.build)(&config.params);
-    let next = Iteration { scene: &scene, seed: args.seed, index: film.iterations };
+    let next = Iteration { scene: &scene, seed: args.what.seed, index: film.iterations };
     if !pool.install(|| integrator.restore(&next, &state)) {
         return Err(Failure::Input("the checkpoint does not hold what this integrator has learnt".into()));
     }
@@ -100,26 +100,34 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let outcome = pool.install(|| {
         if let Some(target) = &args.error_target {
             let build = || (config.spec.build)(&config.params);
-            let what = (args.seed, config.budget, target);
+            let what = (args.what.seed, config.budget, target);
             let (outcome, found) = render_to_target(&scene, build, &mut film, what, &interrupt, |progress, found| {
                 show(&bar, progress);
                 if let Some(found) = found {
                     bar.set_message(format!("{} spp  {} about {found:.2e}", progress.iterations, target.key));
                 }
             });
-            let seeds = error_target::seeds(args.seed);
+            let seeds = error_target::seeds(args.what.seed);
             estimate = Some(ErrorEstimate { measure: target.key, target: target.value, estimate: found, seeds });
             return outcome;
         }
-        render(&scene, &mut *integrator, &mut film, args.seed, config.budget, &interrupt, |progress, film, state| {
-            show(&bar, progress);
-            if let (Some(path), Some(identity)) = (&args.checkpoint, &identity)
-                && last_checkpoint.elapsed() > CHECKPOINT_EVERY
-            {
-                trouble = trouble.take().or(identity.save(path, film, &state()).err());
-                last_checkpoint = Instant::now();
-            }
-        })
+        render(
+            &scene,
+            &mut *integrator,
+            &mut film,
+            args.what.seed,
+            config.budget,
+            &interrupt,
+            |progress, film, state| {
+                show(&bar, progress);
+                if let (Some(path), Some(identity)) = (&args.checkpoint, &identity)
+                    && last_checkpoint.elapsed() > CHECKPOINT_EVERY
+                {
+                    trouble = trouble.take().or(identity.save(path, film, &state()).err());
+                    last_checkpoint = Instant::now();
+                }
+            },
+        )
     });
     bar.finish_and_clear();
     if film.iterations == 0 {
@@ -130,7 +138,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         trouble = identity.save(path, &film, &integrator.state()).err();
     }
 
-    let run = (args.seed, config.threads, config.spec.name);
+    let run = (args.what.seed, config.threads, config.spec.name);
     let mut stats = RenderStats::new(&scene, &film, &outcome, phases, textures, run);
     stats.error = estimate;
     let mut clock = Clock::default();
@@ -231,7 +239,7 @@ fn write_outputs(
     if args.output.is_empty() {
         return (written, result);
     }
-    let layers = if config.aovs.is_empty() { vec![] } else { aov::layers(scene, film, args.seed, &config.aovs) };
+    let layers = if config.aovs.is_empty() { vec![] } else { aov::layers(scene, film, args.what.seed, &config.aovs) };
     let picture = output::picture(film, layers, metadata(args, config, stats));
     for path in &args.output {
         match write_picture(path, &picture, args.exposure) {

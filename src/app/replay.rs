@@ -11,9 +11,19 @@ use crate::prepared::{PrepareOptions, PreparedScene};
 
 pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     let (desc, mut diagnostics) = report::load(&args.scene, true)?;
-    let config =
-        Config::of_integrator(args.integrator.as_deref(), args.max_depth, &args.param, &desc, &mut diagnostics)?;
-    let options = PrepareOptions { backend: Query::backend(args.query), threads: 1, size: args.size, crop: args.crop };
+    let config = Config::of_integrator(
+        args.what.integrator.as_deref(),
+        args.what.max_depth,
+        &args.what.param,
+        &desc,
+        &mut diagnostics,
+    )?;
+    let options = PrepareOptions {
+        backend: Query::backend(args.what.query),
+        threads: 1,
+        size: args.what.size,
+        crop: args.what.crop,
+    };
     let prepared = PreparedScene::build(desc, &options, &mut diagnostics);
     if diagnostics.has_errors() {
         report::print(&diagnostics);
@@ -28,9 +38,9 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     if x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height {
         return Err(Failure::Input(format!("pixel {x},{y} is not in the picture ({x0},{y0},{width},{height})")));
     }
-    let iteration = Iteration { scene: &scene, seed: args.seed, index: args.iteration };
+    let iteration = Iteration { scene: &scene, seed: args.what.seed, index: args.iteration };
     let replay = (spec.build)(&params).replay(&iteration, (x, y));
-    out!("{} pixel {x},{y} iteration {} seed {}", spec.name, args.iteration, args.seed);
+    out!("{} pixel {x},{y} iteration {} seed {}", spec.name, args.iteration, args.what.seed);
     print(&replay, scene.centre);
     Ok(())
 }
