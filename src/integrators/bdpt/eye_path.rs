@@ -84,6 +84,8 @@ pub(in crate::integrators) struct EyeHooks<'a, 'q> {
     pub light: &'a LightPath,
     pub side: &'a mut Side,
     pub cos_leaving: f32,
+    /// What is known of the light at the last vertex, on either side of its surface, as far as it was asked for.
+    pub known: [Option<There>; 2],
     pub pixel: (u32, u32),
     /// z_0.
     pub lens: Vec3,
@@ -193,6 +195,21 @@ impl EyeHooks<'_, '_> {
         self.queues.direct.push(&segment, found, tracer, |f| arrived(Arrival::Direct, f));
     }
 
+    /// Value and density at an eye vertex for light that comes along `from` and goes on to the vertex before; the value only if weights
+    /// ask for it.
+    fn back(&self, vertex: &SurfaceVertex, from: Vec3) -> (Rgb, SolidAnglePdf) {
+        match self.this.weigher.resampled {
+            Some(_) => vertex.bsdf.eval_and_pdf(from, vertex.wo, Transport::Importance),
+            None => (Rgb::BLACK, vertex.bsdf.pdf(from, vertex.wo, Transport::Importance)),
+        }
+    }
+
+    /// What is known of the light at the walk's last vertex, on the side of the direction `d`; looked up once.
+    fn there(&mut self, point: &SurfacePoint, d: Vec3) -> There {
+        let Some(resampler) = &self.this.resampler else { return There::default() };
+        *self.known[usize::from(point.ng.dot(d) < 0.0)].get_or_insert_with(|| resampler.there(point, d))
+    }
+
     fn direct_weight(
         &self,
         vertex: &SurfaceVertex,
@@ -215,7 +232,7 @@ impl EyeHooks<'_, '_> {
         };
         let origin = sample.end.vertex_density(position, emission) * chosen;
         let walked = bsdf_pdf.0 * self.this.weigher.eye_limits.survival(vertex.index, vertex.bsdf);
-        let back = vertex.bsdf.eval_and_pdf(sample.wi, vertex.wo, Transport::Importance);
+        let back = self.back(vertex, sample.wi);
         let split = Split {
             light: &[Node::origin(origin)],
             light_joint: Joint {
@@ -260,16 +277,16 @@ impl EyeHooks<'_, '_> {
         let weigher = &self.this.weigher;
         let eye_pdf = eye_pdf.0 * weigher.eye_limits.survival(vertex.index, vertex.bsdf);
         let light_pdf = light_pdf.0 * weigher.light_limits.survival(light.s as u32 - 1, &light.bsdf);
-        let back = vertex.bsdf.eval_and_pdf(to_light, vertex.wo, Transport::Importance);
+        let back = self.back(vertex, to_light);
         let scattered = light.throughput * at_light;
         let arriving = scattered * (1.0 / light_pdf);
         let spread_z = spread(z.ng.dot(to_light), dist2);
-        let factor = self.this.resampler.as_ref().map_or(1.0, |resampler| {
+        let factor = weigher.resampled.map_or(1.0, |resampled| {
             let brings = Targets {
                 scattered: scattered.luminance() * spread_z,
                 unscattered: light.throughput.luminance() * y.ng.dot(to_light).abs() * spread_z,
             };
-            resampler.factor(&self.this.weigher, (brings, dist2), z, to_light)
+            resampled.factor(brings, dist2, self.there(z, to_light))
         });
         let split = Split {
             light: to.nodes,
@@ -300,6 +317,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
     fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
         let (point, edge) = (vertex.point, vertex.edge);
         let dist2 = edge.distance * edge.distance;
+        self.known = [None; 2];
         let cos = point.ng.dot(vertex.wo);
         let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
         self.side.arrive(
@@ -359,14 +377,17 @@ impl WalkHooks for EyeHooks<'_, '_> {
             vertex.bsdf.pdf(sample.wi, vertex.wo, Transport::Importance)
         };
         self.side.leave(reverse, sample.delta);
-        if let (Some(resampler), Some(node)) = (&self.this.resampler, self.side.last_mut()) {
-            node.there = resampler.there(vertex.point, sample.wi);
+        // Nothing else asks for what light would do here on its way.
+        if self.this.weigher.resampled.is_some() {
+            let there = self.there(vertex.point, sample.wi);
             let value = if sample.delta {
                 sample.reverse_delta
             } else {
                 vertex.bsdf.eval(sample.wi, vertex.wo, Transport::Importance)
             };
-            (node.adjoint, node.reverse) = (value, reverse.0);
+            if let Some(node) = self.side.last_mut() {
+                (node.there, node.adjoint, node.reverse) = (there, value, reverse.0);
+            }
         }
         if let Some(record) = &mut self.record {
             record.leaving(true, sample);

@@ -298,13 +298,16 @@ impl WalkHooks for LightHooks<'_, '_> {
         } else {
             let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
             self.out.side.arrive(forward, spread(self.cos_leaving, dist2), eye_survival);
-            if let (Some(resampler), Some(node)) = (&self.this.resampler, self.out.side.last_mut()) {
+            let this = self.this;
+            if let (Some(resampler), Some(resampled), Some(node)) =
+                (&this.resampler, &this.weigher.resampled, self.out.side.last_mut())
+            {
                 // What the sub-path brings here is its throughput times the density of having come here.
                 let brings = Targets {
                     scattered: vertex.throughput.luminance() * forward.0,
                     unscattered: self.luminance_before * self.cos_leaving.abs() * spread(cos, dist2),
                 };
-                node.factor = resampler.factor(&self.this.weigher, (brings, dist2), point, vertex.wo);
+                node.factor = resampled.factor(brings, dist2, resampler.there(point, vertex.wo));
             }
         }
         if let Some(record) = &mut self.record {

@@ -273,6 +273,7 @@ impl Bidirectional {
             light: &worker.light,
             side: &mut worker.eye,
             cos_leaving: 0.0,
+            known: [None; 2],
             pixel: (x, y),
             lens: eye.origin,
             record,

@@ -8,36 +8,30 @@
 //!   of all light sub-paths; there are no other ways to make a path, so the 1/d² of near ones shows.
 
 use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH, TECHNIQUES, sizing};
-use super::resampling::{Scheme, Settings, Weights};
+use super::resampling::{self, Scheme, Settings, Weights};
 use super::{Integrator, IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::{Heuristic, Techniques};
 use crate::prepared::Features;
 
 const PATHS: ParamSpec = ParamSpec {
-    name: "paths",
     about: "N, light sub-paths per iteration from which eye vertices draw; all others serve the light image only",
     default: ParamDefault::Int(1024, 1, 10_000_000),
+    ..resampling::PATHS
 };
-const SAMPLES: ParamSpec = ParamSpec {
-    name: "samples",
-    about: "draws of each eye vertex, for each length of light sub-paths",
-    default: ParamDefault::Int(1, 1, 1024),
-};
+const SAMPLES: ParamSpec =
+    ParamSpec { about: "draws of each eye vertex, for each length of light sub-paths", ..resampling::SAMPLES };
 const MANY_SAMPLES: ParamSpec = ParamSpec {
-    name: "samples",
     about: "virtual lights that each camera ray's point is connected to",
     default: ParamDefault::Int(4, 1, 1024),
+    ..SAMPLES
 };
 const RECORDS: ParamSpec = ParamSpec {
     name: "records",
     about: "eye sub-paths that make importance records, per 100 000 pixels",
     default: ParamDefault::Int(100, 0, 100_000),
 };
-const NEIGHBOURS: ParamSpec = ParamSpec {
-    name: "neighbours",
-    about: "records whose probabilities an eye vertex mixes",
-    default: ParamDefault::Int(3, 0, 3),
-};
+const NEIGHBOURS: ParamSpec =
+    ParamSpec { about: "records whose probabilities an eye vertex mixes", ..resampling::NEIGHBOURS };
 const CELLS: ParamSpec = ParamSpec {
     name: "cells",
     about: "voxels along the longest side of the scene for its skeleton; 0: decided by the scene",

@@ -34,7 +34,7 @@ use super::{IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::Heuristic;
 pub(in crate::integrators) use resampler::Resampler;
 
-const PATHS: ParamSpec = ParamSpec {
+pub(in crate::integrators) const PATHS: ParamSpec = ParamSpec {
     name: "paths",
     about: "M, light sub-paths per iteration from which eye vertices draw",
     default: ParamDefault::Int(200, 1, 10_000_000),
@@ -56,9 +56,9 @@ const SECOND_STAGE: ParamSpec = ParamSpec {
     about: "M2, light vertices that the first stage leaves to a group of cache points",
     default: ParamDefault::Int(200, 1, 1_000_000),
 };
-const SAMPLES: ParamSpec =
+pub(in crate::integrators) const SAMPLES: ParamSpec =
     ParamSpec { name: "samples", about: "N, draws of each eye vertex", default: ParamDefault::Int(1, 1, 1024) };
-const NEIGHBOURS: ParamSpec = ParamSpec {
+pub(in crate::integrators) const NEIGHBOURS: ParamSpec = ParamSpec {
     name: "neighbours",
     about: "cache points whose probabilities an eye vertex mixes",
     default: ParamDefault::Int(3, 0, 3),

@@ -50,7 +50,7 @@ impl Bidirectional {
             resampler.sites = Some(sites);
             if scheme != (Scheme::Records { pooled: true }) {
                 let first = Iteration { index: 0, ..*iteration };
-                let (store, s) = LightStore::trace(self, &first, WARM_UP_PATHS, 1);
+                let (store, s) = LightStore::trace(self, &first, (WARM_UP_PATHS, 1), false);
                 stats.merge(&s);
                 self.know_lengths(store.lengths(), WARM_UP_PATHS);
             }
@@ -62,7 +62,7 @@ impl Bidirectional {
         let first = Iteration { index: 0, ..*iteration };
         let (mut seen, mut pmfs) = ([0, 0], Pmfs::default());
         for set in 1..=WARM_UP {
-            let (store, s) = LightStore::trace(self, &first, paths.min(WARM_UP_PATHS), set);
+            let (store, s) = LightStore::trace(self, &first, (paths.min(WARM_UP_PATHS), set), clusters.is_some());
             stats.merge(&s);
             // Random numbers of iterations count from zero up, those of warm-ups from the top down.
             stats.merge(&pmfs.find(scene, &caches, &store, clusters, (iteration.seed, u64::MAX - set)));
@@ -96,7 +96,7 @@ impl Bidirectional {
         let Settings { second_stage, paths, .. } = resampler.settings;
         let mut store = std::mem::take(&mut resampler.store);
         let pieces = phases.time("light paths", || self.light_pass(iteration, paths, &mut store));
-        phases.time("light tree", || store.finish());
+        phases.time("light tree", || store.finish(second_stage.is_some()));
         let Some(resampler) = &mut self.resampler else { return (stats, pieces) };
         resampler.store = store;
         if let Some(sites) = &resampler.sites {

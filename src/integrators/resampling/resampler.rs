@@ -9,7 +9,7 @@ use super::{Scheme, Settings, Weights};
 use crate::integrators::bdpt::eye_path::Candidate;
 use crate::math::Vec3;
 use crate::math::hash::HashRng;
-use crate::mis::{Resampled, Targets, There, Weigher};
+use crate::mis::{Resampled, There};
 use crate::shade::SurfacePoint;
 use crate::spatial::nearest::MOST;
 
@@ -61,21 +61,6 @@ impl Resampler {
         }
     }
 
-    /// c of a sub-path that brings the first to a point from the direction `from`, from a squared distance.
-    #[inline]
-    pub fn factor(
-        &self,
-        weigher: &Weigher,
-        (brings, distance2): (Targets, f32),
-        point: &SurfacePoint,
-        from: Vec3,
-    ) -> f32 {
-        match &weigher.resampled {
-            None => 1.0,
-            Some(resampled) => resampled.factor(brings, distance2, self.there(point, from)),
-        }
-    }
-
     /// What weights know.
     pub(super) fn resampled(&self) -> Option<Resampled> {
         let [vertices, paths] = self.seen;
@@ -109,11 +94,19 @@ impl Resampler {
         if self.store.is_empty() {
             return;
         }
+        let (mut found, most) = ([0; MOST], self.settings.neighbours);
         if matches!(self.settings.scheme, Scheme::Caches) {
+            let mut count = 0;
+            if let Some(caches) = &self.caches {
+                for i in caches.index.find(point.p, side(point, wo)).take(most) {
+                    found[count] = i;
+                    count += 1;
+                }
+            }
             for _ in 0..self.settings.samples {
                 let u = rng.next_4();
                 if u[2] < effort
-                    && let Some(candidate) = self.draw(point, wo, [u[0], u[1]], effort)
+                    && let Some(candidate) = self.draw(&found[..count], [u[0], u[1]], effort)
                     && possible(candidate.vertex.s)
                 {
                     connect(candidate);
@@ -122,8 +115,7 @@ impl Resampler {
             return;
         }
         let Some(sites) = &self.sites else { return };
-        let mut found = [0; MOST];
-        let count = sites.find(point.p, side(point, wo), self.settings.neighbours, &mut found);
+        let count = sites.find(point.p, side(point, wo), most, &mut found);
         for class in 0..self.combined.classes() {
             let length = self.combined.length(class);
             if length.is_some_and(|s| !possible(s)) {
@@ -152,20 +144,12 @@ impl Resampler {
         self.lengths.get(s).copied().unwrap_or(last)
     }
 
-    /// Draws a candidate for an eye vertex at `point` that looks from the side of `wo`; `None` if there are none. Only a share
-    /// `effort` of draws is made.
+    /// Draws a candidate by the cache points `near`; `None` if there are none. Only a share `effort` of draws is made.
     #[inline]
-    fn draw(&self, point: &SurfacePoint, wo: Vec3, u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
-        let (mut near, mut n) = ([0; MOST], 0);
-        if let Some(caches) = &self.caches {
-            for i in caches.index.find(point.p, side(point, wo)).take(self.settings.neighbours) {
-                near[n] = i;
-                n += 1;
-            }
-        }
-        let Choice { vertex, probability } = match n {
-            0 => self.draw_anything(u[1])?,
-            _ => self.pmfs.draw(&near[..n], u)?,
+    fn draw(&self, near: &[usize], u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
+        let Choice { vertex, probability } = match near {
+            [] => self.draw_anything(u[1])?,
+            _ => self.pmfs.draw(near, u)?,
         };
         let scale = 1.0 / (probability * self.settings.paths as f32 * self.settings.samples as f32 * effort);
         Some(self.store.candidate(vertex, scale))

@@ -72,8 +72,13 @@ impl LightVertex {
 }
 
 impl LightStore {
-    /// Traces `paths` light sub-paths, of which `set` tells one set from another, before the first iteration.
-    pub fn trace(this: &Bidirectional, iteration: &Iteration, paths: u32, set: u64) -> (LightStore, RayStats) {
+    /// Traces light sub-paths, of which `set` tells one set from another, before the first iteration.
+    pub fn trace(
+        this: &Bidirectional,
+        iteration: &Iteration,
+        (paths, set): (u32, u64),
+        with_tree: bool,
+    ) -> (LightStore, RayStats) {
         let scene = iteration.scene;
         let stream = WARM_UP_STREAM | set << 32;
         let pieces: Vec<(LightStore, RayStats)> = (0..paths.div_ceil(AT_ONCE))
@@ -95,7 +100,7 @@ impl LightStore {
             store.append(piece);
             stats.merge(&s);
         }
-        store.finish();
+        store.finish(with_tree);
         (store, stats)
     }
 
@@ -137,10 +142,13 @@ impl LightStore {
         self.vertices.append(&mut other.vertices);
     }
 
-    /// Puts the vertices in order, when all are there.
-    pub fn finish(&mut self) {
+    /// Puts the vertices in order, when all are there, and builds the tree over them if a first stage wants it.
+    pub fn finish(&mut self, with_tree: bool) {
         let positions: Vec<Vec3> = self.vertices.iter().map(|v| v.vertex.point.p).collect();
         self.order = morton::order(&positions);
+        if !with_tree {
+            return;
+        }
         let sorted: Vec<Vec3> = self.order.iter().map(|&i| positions[i as usize]).collect();
         let vertices = &self.vertices;
         self.tree.build(
