@@ -9,6 +9,8 @@
 
 use super::There;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
+use crate::path::{Edge, SurfaceVertex};
+use crate::shade::{BsdfSample, Transport};
 
 /// A vertex of one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,29 +76,62 @@ pub fn spread(cos: f32, dist2: f32) -> f32 {
 #[derive(Clone, Debug, Default)]
 pub struct Side {
     nodes: Vec<Node>,
+    cos_leaving: f32,
 }
 
 impl Side {
     /// Starts over at an origin of the given density.
     pub fn begin(&mut self, origin: AreaPdf) {
         self.nodes.clear();
+        self.cos_leaving = 0.0;
         self.nodes.push(Node::origin(origin));
     }
 
-    /// The walk arrived at its next vertex.
+    /// The walk arrived on a surface from another vertex that is not a light's; `survival` is that of a walk from the other end there. The
+    /// area density of having come.
+    #[inline]
+    pub fn arrive_on(&mut self, vertex: &SurfaceVertex, survival: f32) -> AreaPdf {
+        let (edge, cos) = (vertex.edge, vertex.point.ng.dot(vertex.wo));
+        let distance2 = edge.distance * edge.distance;
+        let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, distance2);
+        let spread = spread(self.cos_leaving, distance2);
+        self.nodes.push(Node { spread, survival, cos: cos.abs(), distance2, ..Node::plain(forward) });
+        forward
+    }
+
+    /// The walk left the scene. Such a vertex has a density per steradian, and only the tilt of the vertex before spreads the disk that
+    /// emission from there starts on.
+    pub fn arrive_at_infinity(&mut self, edge: &Edge) {
+        self.arrive(AreaPdf(edge.pdf.0 * edge.survival), self.cos_leaving.abs(), 1.0);
+    }
+
+    /// The walk arrived at its next vertex, with densities of the light's own.
     #[inline]
     pub fn arrive(&mut self, forward: AreaPdf, spread: f32, survival: f32) {
         self.nodes.push(Node { spread, survival, ..Node::plain(forward) });
     }
 
-    /// The walk leaves its last vertex; `reverse` is the density per steradian there of the direction back, given the one it goes on
-    /// in (of a delta event the discrete probability of the reverse event).
+    /// The walk leaves its last vertex, `vertex`, by `sample`; `back` is the transport of a walk from the other end. Returned is the
+    /// density per steradian there of the direction back, given the one the walk goes on in (of a delta event the discrete probability of
+    /// the reverse event).
     #[inline]
-    pub fn leave(&mut self, reverse: SolidAnglePdf, delta: bool) {
+    pub fn leave(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample, back: Transport) -> SolidAnglePdf {
+        self.cos_leaving = vertex.point.ng.dot(sample.wi);
+        let reverse = match sample.delta {
+            true => sample.pdf_reverse_delta,
+            false => vertex.bsdf.pdf(sample.wi, vertex.wo, back),
+        };
         if let [.., before, last] = self.nodes.as_mut_slice() {
-            last.smooth = !delta;
+            last.smooth = !sample.delta;
             before.ratio = reverse.0 * last.spread / before.forward.0;
         }
+        reverse
+    }
+
+    /// Cosine between the last vertex's surface and the edge on which the walk left it.
+    #[inline]
+    pub fn cos_leaving(&self) -> f32 {
+        self.cos_leaving
     }
 
     /// The last vertex.

@@ -83,7 +83,6 @@ pub(in crate::integrators) struct EyeHooks<'a, 'q> {
     pub iteration: &'a Iteration<'a>,
     pub light: &'a LightPath,
     pub side: &'a mut Side,
-    pub cos_leaving: f32,
     /// What is known of the light at the last vertex, on either side of its surface, as far as it was asked for.
     pub known: [Option<There>; 2],
     pub pixel: (u32, u32),
@@ -316,18 +315,8 @@ impl EyeHooks<'_, '_> {
 impl WalkHooks for EyeHooks<'_, '_> {
     fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
         let (point, edge) = (vertex.point, vertex.edge);
-        let dist2 = edge.distance * edge.distance;
         self.known = [None; 2];
-        let cos = point.ng.dot(vertex.wo);
-        let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
-        self.side.arrive(
-            forward,
-            spread(self.cos_leaving, dist2),
-            self.this.weigher.light_limits.roulette(vertex.bsdf),
-        );
-        if let Some(node) = self.side.last_mut() {
-            (node.cos, node.distance2) = (cos.abs(), dist2);
-        }
+        self.side.arrive_on(vertex, self.this.weigher.light_limits.roulette(vertex.bsdf));
         if let Some(record) = &mut self.record {
             record.vertex(true, vertex);
         }
@@ -370,13 +359,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
     }
 
     fn leaving(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample) {
-        self.cos_leaving = vertex.point.ng.dot(sample.wi);
-        let reverse = if sample.delta {
-            sample.pdf_reverse_delta
-        } else {
-            vertex.bsdf.pdf(sample.wi, vertex.wo, Transport::Importance)
-        };
-        self.side.leave(reverse, sample.delta);
+        let reverse = self.side.leave(vertex, sample, Transport::Importance);
         // Nothing else asks for what light would do here on its way.
         if self.this.weigher.resampled.is_some() {
             let there = self.there(vertex.point, sample.wi);
@@ -396,8 +379,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
 
     fn escaped(&mut self, _index: u32, direction: Vec3, throughput: Rgb, edge: &Edge) {
         let lights = &self.scene.lights;
-        // A vertex at infinity: its density is per steradian, and only the tilt of the vertex before spreads the emission disk.
-        self.side.arrive(AreaPdf(edge.pdf.0 * edge.survival), self.cos_leaving.abs(), 1.0);
+        self.side.arrive_at_infinity(edge);
         for &id in lights.infinite() {
             let emitted = lights.get(id).emitted([0.0; 2], -direction);
             if !emitted.is_black() {

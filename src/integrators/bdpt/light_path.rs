@@ -65,19 +65,8 @@ pub(in crate::integrators) fn trace(
     out.light_can_be_hit = !light.is_delta();
     let flux = emission.flux() * (1.0 / chosen.0);
     out.origin = Some(Origin { light: id, end: emission.end, leaving: emission.direction, flux });
-    let mut hooks = LightHooks {
-        this,
-        scene,
-        id,
-        chosen,
-        emission: &emission,
-        cos_leaving: 0.0,
-        luminance_before: 0.0,
-        out,
-        lens,
-        record,
-        keep,
-    };
+    let mut hooks =
+        LightHooks { this, scene, id, chosen, emission: &emission, luminance_before: 0.0, out, lens, record, keep };
     hooks.emitter_to_lens([v[2], v[3]], tracer, sampler);
     if flux.is_black() || this.weigher.light_limits.max_edges < 2 {
         return;
@@ -116,8 +105,6 @@ struct LightHooks<'a, 'q> {
     id: LightId,
     chosen: Pmf,
     emission: &'a EmissionSample,
-    /// |cos| at the vertex before, between its geometric normal and the edge.
-    cos_leaving: f32,
     /// Luminance of β_L on arriving at the vertex before.
     luminance_before: f32,
     out: &'a mut LightPath,
@@ -296,8 +283,8 @@ impl WalkHooks for LightHooks<'_, '_> {
             self.out.side.arrive(forward, to_light, eye_survival);
             self.out.next_event = self.next_event(vertex, to_light);
         } else {
-            let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, dist2);
-            self.out.side.arrive(forward, spread(self.cos_leaving, dist2), eye_survival);
+            let forward = self.out.side.arrive_on(vertex, eye_survival);
+            let cos_leaving = self.out.side.cos_leaving();
             let this = self.this;
             if let (Some(resampler), Some(resampled), Some(node)) =
                 (&this.resampler, &this.weigher.resampled, self.out.side.last_mut())
@@ -305,7 +292,7 @@ impl WalkHooks for LightHooks<'_, '_> {
                 // What the sub-path brings here is its throughput times the density of having come here.
                 let brings = Targets {
                     scattered: vertex.throughput.luminance() * forward.0,
-                    unscattered: self.luminance_before * self.cos_leaving.abs() * spread(cos, dist2),
+                    unscattered: self.luminance_before * cos_leaving.abs() * spread(cos, dist2),
                 };
                 node.factor = resampled.factor(brings, dist2, resampler.there(point, vertex.wo));
             }
@@ -335,14 +322,8 @@ impl WalkHooks for LightHooks<'_, '_> {
     }
 
     fn leaving(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample) {
-        self.cos_leaving = vertex.point.ng.dot(sample.wi);
         self.luminance_before = vertex.throughput.luminance();
-        let reverse = if sample.delta {
-            sample.pdf_reverse_delta
-        } else {
-            vertex.bsdf.pdf(sample.wi, vertex.wo, Transport::Radiance)
-        };
-        self.out.side.leave(reverse, sample.delta);
+        self.out.side.leave(vertex, sample, Transport::Radiance);
         if let Some(record) = &mut self.record {
             record.leaving(false, sample);
         }

@@ -272,7 +272,6 @@ impl Bidirectional {
             iteration,
             light: &worker.light,
             side: &mut worker.eye,
-            cos_leaving: 0.0,
             known: [None; 2],
             pixel: (x, y),
             lens: eye.origin,
