@@ -12,7 +12,7 @@ pub mod bsdf;
 pub mod point;
 pub mod texture;
 
-pub use bsdf::{Bsdf, BsdfSample, Features, Material, MaterialSet};
+pub use bsdf::{Bsdf, BsdfPool, BsdfRef, BsdfSample, Features, KeptBsdf, Material, MaterialSet};
 pub use point::SurfacePoint;
 pub use texture::{ColorTexture, ScalarTexture, Texture, TextureSet};
 

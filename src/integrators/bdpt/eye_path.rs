@@ -14,7 +14,7 @@ use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_se
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 use crate::ray::offset::{SegmentEnd, segment};
-use crate::shade::{BsdfSample, SurfacePoint, Transport};
+use crate::shade::{BsdfRef, BsdfSample, SurfacePoint, Transport};
 
 /// Where contributions of an eye sub-path wait and go.
 pub(in crate::integrators) struct EyeQueues<'a> {
@@ -36,6 +36,8 @@ pub(in crate::integrators) enum Arrival {
 pub(in crate::integrators) struct Candidate<'a> {
     /// Its last vertex, y_{s−1}.
     pub vertex: &'a LightVertex,
+    /// Its BSDF.
+    pub bsdf: BsdfRef<'a>,
     /// Its s vertices.
     pub nodes: &'a [Node],
     /// c_1 of paths with its first two vertices.
@@ -55,7 +57,8 @@ impl<'a> Candidate<'a> {
     fn of(path: &'a LightPath, vertex: &'a LightVertex, scale: f32) -> Candidate<'a> {
         Candidate {
             vertex,
-            nodes: path.side.first(vertex.s),
+            bsdf: path.bsdfs.get(&vertex.bsdf, vertex.ng),
+            nodes: path.side.first(vertex.length()),
             next_event: path.next_event,
             light_can_be_hit: path.light_can_be_hit,
             origin: path.origin,
@@ -253,7 +256,7 @@ impl EyeHooks<'_, '_> {
     fn connect(&mut self, vertex: &SurfaceVertex, to: &Candidate, tracer: &mut Tracer) {
         let light = to.vertex;
         let t = vertex.index as usize + 1;
-        let (z, y) = (vertex.point, &light.point);
+        let (z, y) = (vertex.point, light);
         let offset = y.p - z.p;
         let dist2 = offset.length_squared();
         // Points that cannot be told apart have no direction between them. And of a point that lies in another's plane up to the
@@ -268,14 +271,14 @@ impl EyeHooks<'_, '_> {
         if at_eye.is_black() {
             return;
         }
-        let (at_light, light_pdf) = light.bsdf.eval_and_pdf(light.wo, -to_light, Transport::Importance);
+        let (at_light, light_pdf) = to.bsdf.eval_and_pdf(light.wo, -to_light, Transport::Importance);
         let raw = vertex.throughput * at_eye * at_light * light.throughput * (to.scale / dist2);
         if raw.is_black() {
             return;
         }
         let weigher = &self.this.weigher;
         let eye_pdf = eye_pdf.0 * weigher.eye_limits.survival(vertex.index, vertex.bsdf);
-        let light_pdf = light_pdf.0 * weigher.light_limits.survival(light.s as u32 - 1, &light.bsdf);
+        let light_pdf = light_pdf.0 * light.survival;
         let back = self.back(vertex, to_light);
         let scattered = light.throughput * at_light;
         let arriving = scattered * (1.0 / light_pdf);
@@ -291,7 +294,7 @@ impl EyeHooks<'_, '_> {
             light: to.nodes,
             light_joint: Joint {
                 arrival: AreaPdf(eye_pdf * spread(y.ng.dot(to_light), dist2)),
-                departure: light.bsdf.pdf(-to_light, light.wo, Transport::Radiance),
+                departure: to.bsdf.pdf(-to_light, light.wo, Transport::Radiance),
             },
             eye: self.side.first(t),
             eye_joint: Joint { arrival: AreaPdf(light_pdf * spread_z), departure: back.1 },
@@ -302,11 +305,8 @@ impl EyeHooks<'_, '_> {
             adjoint: back.0,
         };
         let weight = self.this.weigher.weight(&split);
-        let segment = segment(
-            &SegmentEnd::Surface { p: z.p, error: z.error, ng: z.ng },
-            &SegmentEnd::Surface { p: y.p, error: y.error, ng: y.ng },
-        );
-        let found = self.found((light.s, t), (to.origin, to.number), raw, weight);
+        let segment = segment(&SegmentEnd::Surface { p: z.p, error: z.error, ng: z.ng }, &y.end());
+        let found = self.found((light.length(), t), (to.origin, to.number), raw, weight);
         let arrived = &mut *self.queues.found;
         self.queues.connection.push(&segment, found, tracer, |f| arrived(Arrival::Connection, f));
     }
@@ -343,7 +343,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
             let light = self.light;
             match &this.resampler {
                 None => {
-                    for y in light.vertices.iter().filter(|y| possible(y.s)) {
+                    for y in light.vertices.iter().filter(|y| possible(y.length())) {
                         self.connect(vertex, &Candidate::of(light, y, 1.0 / this.effort.connections), tracer);
                     }
                 }

@@ -10,19 +10,40 @@ use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
 use crate::ray::{Ray, RayKind, Segment, T_MIN, Tracer};
-use crate::shade::{Bsdf, BsdfSample, SurfacePoint, Transport};
+use crate::shade::{BsdfPool, BsdfSample, KeptBsdf, SurfacePoint, Transport};
 
-/// A vertex y_{s−1} of a light sub-path, s ≥ 2, that eye vertices can be connected to.
-#[derive(Clone, Debug)]
+/// A vertex y_{s−1} of a light sub-path, s ≥ 2, that eye vertices can be connected to. There are many of them: this is all that is needed.
+#[derive(Clone, Copy, Debug)]
 pub(in crate::integrators) struct LightVertex {
-    pub point: SurfacePoint,
-    pub bsdf: Bsdf,
+    pub p: Vec3,
+    /// Bound on the error of any component of `p`.
+    pub error: f32,
+    /// Unit geometric normal.
+    pub ng: Vec3,
     /// Unit direction towards y_{s−2}.
     pub wo: Vec3,
     /// β_L: everything of the measurement contribution up to the vertex, over its density.
     pub throughput: Rgb,
+    /// Survival of a light sub-path here.
+    pub survival: f32,
     /// s: the vertices of the sub-path up to this one.
-    pub s: usize,
+    pub s: u32,
+    /// The BSDF, seen from `wo`; its lobes are where the vertex is.
+    pub bsdf: KeptBsdf,
+}
+
+impl LightVertex {
+    /// Its end of a shadow ray.
+    #[inline]
+    pub fn end(&self) -> SegmentEnd {
+        SegmentEnd::Surface { p: self.p, error: self.error, ng: self.ng }
+    }
+
+    /// Number of vertices of the sub-path.
+    #[inline]
+    pub fn length(&self) -> usize {
+        self.s as usize
+    }
 }
 
 /// A light sub-path, with what connections to it need.
@@ -32,12 +53,23 @@ pub(in crate::integrators) struct LightPath {
     pub side: Side,
     /// Those of its vertices that can be connected to.
     pub vertices: Vec<LightVertex>,
+    /// Their BSDFs.
+    pub bsdfs: BsdfPool,
     /// c_1 of paths through y_1, see `mis::weigh`.
     pub next_event: f32,
     /// Rays can meet the light by chance.
     pub light_can_be_hit: bool,
     /// y_0; nothing if no light was drawn.
     pub origin: Option<Origin>,
+}
+
+impl LightPath {
+    /// Forgets its vertices, but not its memory.
+    pub fn clear(&mut self) {
+        self.vertices.clear();
+        self.bsdfs.clear();
+        self.origin = None;
+    }
 }
 
 /// Traces a light sub-path and connects its vertices to the lens, if `lens` takes that. It leaves its densities in `out`, and its
@@ -53,8 +85,7 @@ pub(in crate::integrators) fn trace(
     record: Option<&mut Replay>,
     keep: bool,
 ) {
-    out.vertices.clear();
-    out.origin = None;
+    out.clear();
     let u = sampler.origin();
     let v = sampler.origin_direction();
     let Some((id, chosen)) = scene.lights.pick(u[0]) else { return };
@@ -310,11 +341,14 @@ impl WalkHooks for LightHooks<'_, '_> {
             }
             if self.keep {
                 self.out.vertices.push(LightVertex {
-                    point: *point,
-                    bsdf: vertex.bsdf.clone(),
+                    p: point.p,
+                    error: point.error,
+                    ng: point.ng,
                     wo: vertex.wo,
                     throughput: vertex.throughput,
-                    s,
+                    survival: self.this.weigher.light_limits.survival(index, vertex.bsdf),
+                    s: index + 1,
+                    bsdf: self.out.bsdfs.keep(vertex.bsdf),
                 });
             }
         }

@@ -324,7 +324,7 @@ impl Bidirectional {
         pieces
             .into_iter()
             .map(|(piece, part)| {
-                store.append(part);
+                store.append(&part);
                 piece
             })
             .collect()
@@ -354,7 +354,7 @@ impl Bidirectional {
             if !self.resamples() && self.uses_light_paths() {
                 match self.has_light_path(iteration, number) {
                     true => self.light_path(iteration, number, worker, &mut tracer, None, self.connects),
-                    false => worker.light.vertices.clear(),
+                    false => worker.light.clear(),
                 }
             }
             if techniques.uses_eye_paths() {

@@ -16,7 +16,7 @@
 use super::sites::Sites;
 use super::store::LightStore;
 use crate::prepared::PreparedScene;
-use crate::ray::offset::{SegmentEnd, segment};
+use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
 use crate::spatial::nearest::MOST;
 use rayon::prelude::*;
@@ -138,7 +138,7 @@ impl CombinedPmfs {
             self.classes.push(Class { range: 0..store.len(), s: 0 });
             return;
         }
-        let length = |v: &u32| store.vertex(*v as usize).s;
+        let length = |v: &u32| store.vertex(*v as usize).length();
         // Stable: neighbours stay together.
         self.vertices.sort_by_key(length);
         let mut start = 0;
@@ -197,7 +197,7 @@ fn bring(
     }
     for (v, &number) in vertices.iter().enumerate() {
         let y = store.vertex(number as usize);
-        let end = SegmentEnd::Surface { p: y.point.p, error: y.point.error, ng: y.point.ng };
+        let (bsdf, end) = (store.bsdf(y), y.end());
         let mut packet = SegmentPacket::default();
         let mut asked = [0usize; PACKET];
         for site in 0..group.len() {
@@ -205,9 +205,9 @@ fn bring(
             let open = match &sites.normals {
                 Some(normals) => {
                     brought.bounded[site * vertices.len() + v] = y.throughput.luminance();
-                    y.brings(at.position(), normals[group.start + site]).scattered
+                    y.brings(&bsdf, at.position(), normals[group.start + site]).scattered
                 }
-                None => y.throughput.luminance() / y.point.p.distance_squared(at.position()),
+                None => y.throughput.luminance() / y.p.distance_squared(at.position()),
             };
             if open > 0.0 && open.is_finite() {
                 brought.open[site * vertices.len() + v] = open;

@@ -14,7 +14,7 @@ use super::caches::{Caches, Found};
 use super::store::LightStore;
 use crate::math::hash::HashRng;
 use crate::prepared::PreparedScene;
-use crate::ray::offset::{SegmentEnd, segment};
+use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
 use crate::spatial::point_tree::CutMemory;
 use rayon::prelude::*;
@@ -102,18 +102,16 @@ impl GroupPmf {
         for e in 0..self.count {
             let entry = self.entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, stands_for: 1.0 });
             let y = store.vertex(entry.vertex as usize);
+            let (bsdf, end) = (store.bsdf(y), y.end());
             let mut packet = SegmentPacket::default();
             let mut asked = [(0usize, 0.0f32); PACKET];
             for c in 0..group.len() {
-                let brings = y.brings(points[c], sides[c]);
+                let brings = y.brings(&bsdf, points[c], sides[c]);
                 self.found[c][1] += f64::from(brings.unscattered * entry.stands_for);
                 let scattered = brings.scattered * entry.stands_for;
                 if scattered > 0.0 && scattered.is_finite() {
                     asked[packet.len] = (c, scattered);
-                    packet.push(&segment(
-                        caches.end(group.start + c),
-                        &SegmentEnd::Surface { p: y.point.p, error: y.point.error, ng: y.point.ng },
-                    ));
+                    packet.push(&segment(caches.end(group.start + c), &end));
                 }
             }
             if packet.len == 0 {

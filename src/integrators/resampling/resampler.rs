@@ -107,7 +107,7 @@ impl Resampler {
                 let u = rng.next_4();
                 if u[2] < effort
                     && let Some(candidate) = self.draw(&found[..count], [u[0], u[1]], effort)
-                    && possible(candidate.vertex.s)
+                    && possible(candidate.vertex.length())
                 {
                     connect(candidate);
                 }
@@ -131,7 +131,7 @@ impl Resampler {
                 let drawn = self.combined.draw(class, &found[..count], [u[0], u[1]]);
                 let number = self.settings.paths as f32 * self.settings.samples as f32;
                 let candidate = self.store.candidate(drawn.vertex, 1.0 / (drawn.probability * number * effort));
-                if possible(candidate.vertex.s) {
+                if possible(candidate.vertex.length()) {
                     connect(candidate);
                 }
             }

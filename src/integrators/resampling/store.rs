@@ -10,7 +10,7 @@ use crate::math::sampler::PathSampler;
 use crate::mis::{Node, Targets};
 use crate::path::Origin;
 use crate::ray::{RayStats, Tracer};
-use crate::shade::Transport;
+use crate::shade::{BsdfPool, BsdfRef, Transport};
 use crate::spatial::{PointTree, morton};
 use rayon::prelude::*;
 
@@ -26,9 +26,9 @@ pub(in crate::integrators) struct LightStore {
     pub paths_traced: u32,
     paths: Vec<StoredPath>,
     nodes: Vec<Node>,
+    /// When finished, in an order that keeps neighbours together.
     vertices: Vec<StoredVertex>,
-    /// Vertices in an order that keeps neighbours together: numbers below count in this order.
-    order: Vec<u32>,
+    bsdfs: BsdfPool,
     /// Tree over the vertices, weighed by the luminance of f_y/p.
     pub tree: PointTree,
 }
@@ -43,17 +43,17 @@ struct StoredPath {
 }
 
 /// A vertex, and the sub-path it ends.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct StoredVertex {
     vertex: LightVertex,
     path: u32,
 }
 
 impl LightVertex {
-    /// What the sub-path that ends here brings to a surface at `p` on the side `n`, as if nothing were in the way: q̂₂/p and q̂₁/p.
+    /// What the sub-path that ends here, where the BSDF is `bsdf`, brings to a surface at `p` on the side `n`, as if nothing were in the way: q̂₂/p and q̂₁/p.
     #[inline]
-    pub fn brings(&self, p: Vec3, n: Vec3) -> Targets {
-        let to = p - self.point.p;
+    pub fn brings(&self, bsdf: &BsdfRef, p: Vec3, n: Vec3) -> Targets {
+        let to = p - self.p;
         let dist2 = to.length_squared();
         let towards = to * (1.0 / dist2.sqrt());
         let cos = -n.dot(towards);
@@ -61,11 +61,11 @@ impl LightVertex {
         if cos.is_nan() || cos <= 0.0 {
             return Targets::default();
         }
-        let value = self.bsdf.eval(self.wo, towards, Transport::Importance);
+        let value = bsdf.eval(self.wo, towards, Transport::Importance);
         let spread = cos / dist2;
         let targets = Targets {
             scattered: (self.throughput * value).luminance() * spread,
-            unscattered: self.throughput.luminance() * self.point.ng.dot(towards).abs() * spread,
+            unscattered: self.throughput.luminance() * self.ng.dot(towards).abs() * spread,
         };
         if targets.scattered.is_finite() && targets.unscattered.is_finite() { targets } else { Targets::default() }
     }
@@ -97,7 +97,7 @@ impl LightStore {
         let mut store = LightStore::default();
         let mut stats = RayStats::default();
         for (piece, s) in pieces {
-            store.append(piece);
+            store.append(&piece);
             stats.merge(&s);
         }
         store.finish(with_tree);
@@ -129,32 +129,38 @@ impl LightStore {
             origin: path.origin,
         });
         self.nodes.extend_from_slice(path.side.nodes());
-        self.vertices.extend(path.vertices.iter().map(|v| StoredVertex { vertex: v.clone(), path: stored }));
+        let bsdfs = &mut self.bsdfs;
+        self.vertices.extend(path.vertices.iter().map(|v| {
+            let bsdf = bsdfs.keep_from(&v.bsdf, &path.bsdfs);
+            StoredVertex { vertex: LightVertex { bsdf, ..*v }, path: stored }
+        }));
     }
 
     /// Takes in everything of `other`.
-    pub fn append(&mut self, mut other: LightStore) {
+    pub fn append(&mut self, other: &LightStore) {
         let (paths, nodes) = (self.paths.len() as u32, self.nodes.len());
         self.paths_traced += other.paths_traced;
         self.paths.extend(other.paths.iter().map(|path| StoredPath { first_node: path.first_node + nodes, ..*path }));
-        self.nodes.append(&mut other.nodes);
-        other.vertices.iter_mut().for_each(|v| v.path += paths);
-        self.vertices.append(&mut other.vertices);
+        self.nodes.extend_from_slice(&other.nodes);
+        let moved = self.bsdfs.append(&other.bsdfs);
+        self.vertices.extend(other.vertices.iter().map(|v| {
+            let bsdf = v.vertex.bsdf.moved(moved);
+            StoredVertex { vertex: LightVertex { bsdf, ..v.vertex }, path: v.path + paths }
+        }));
     }
 
     /// Puts the vertices in order, when all are there, and builds the tree over them if a first stage wants it.
     pub fn finish(&mut self, with_tree: bool) {
-        let positions: Vec<Vec3> = self.vertices.iter().map(|v| v.vertex.point.p).collect();
-        self.order = morton::order(&positions);
+        let positions: Vec<Vec3> = self.vertices.iter().map(|v| v.vertex.p).collect();
+        self.vertices = morton::order(&positions).iter().map(|&i| self.vertices[i as usize]).collect();
         if !with_tree {
             return;
         }
-        let sorted: Vec<Vec3> = self.order.iter().map(|&i| positions[i as usize]).collect();
-        let vertices = &self.vertices;
+        let sorted: Vec<Vec3> = self.vertices.iter().map(|v| v.vertex.p).collect();
         self.tree.build(
             &sorted,
-            self.order.iter().map(|&i| {
-                let weight = vertices[i as usize].vertex.throughput.luminance();
+            self.vertices.iter().map(|v| {
+                let weight = v.vertex.throughput.luminance();
                 if weight.is_finite() { weight } else { 0.0 }
             }),
         );
@@ -166,41 +172,48 @@ impl LightStore {
         self.paths.clear();
         self.nodes.clear();
         self.vertices.clear();
-        self.order.clear();
+        self.bsdfs.clear();
     }
 
     /// Number of vertices.
     pub fn len(&self) -> usize {
-        self.order.len()
+        self.vertices.len()
     }
 
     /// For each number of vertices, how many sub-paths can be connected to by their vertex of that number; one more is zero.
     pub fn lengths(&self) -> Vec<u32> {
-        let most = self.vertices.iter().map(|v| v.vertex.s).max().unwrap_or(0);
+        let most = self.vertices.iter().map(|v| v.vertex.length()).max().unwrap_or(0);
         let mut counts = vec![0; most + 2];
-        self.vertices.iter().for_each(|v| counts[v.vertex.s] += 1);
+        self.vertices.iter().for_each(|v| counts[v.vertex.length()] += 1);
         counts
     }
 
     /// True if there are none.
     pub fn is_empty(&self) -> bool {
-        self.order.is_empty()
+        self.vertices.is_empty()
     }
 
     /// A vertex, by its place in the order.
     #[inline]
     pub fn vertex(&self, v: usize) -> &LightVertex {
-        &self.vertices[self.order[v] as usize].vertex
+        &self.vertices[v].vertex
+    }
+
+    /// The BSDF of one of its vertices.
+    #[inline]
+    pub fn bsdf(&self, vertex: &LightVertex) -> BsdfRef<'_> {
+        self.bsdfs.get(&vertex.bsdf, vertex.ng)
     }
 
     /// The sub-path that ends in vertex `v`, as a candidate for a connection that counts `scale` times.
     #[inline]
     pub fn candidate(&self, v: usize, scale: f32) -> Candidate<'_> {
-        let StoredVertex { vertex, path } = &self.vertices[self.order[v] as usize];
+        let StoredVertex { vertex, path } = &self.vertices[v];
         let path = &self.paths[*path as usize];
         Candidate {
             vertex,
-            nodes: &self.nodes[path.first_node..path.first_node + vertex.s],
+            bsdf: self.bsdf(vertex),
+            nodes: &self.nodes[path.first_node..path.first_node + vertex.length()],
             next_event: path.next_event,
             light_can_be_hit: path.light_can_be_hit,
             origin: path.origin,

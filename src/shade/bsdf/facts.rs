@@ -1,14 +1,16 @@
 //! What a BSDF can do at all: questions that save work.
 
-use super::Bsdf;
+use super::link::Link;
+use super::{BsdfOf, Leaf, Scattering};
+use std::ops::Deref;
 
-impl Bsdf {
+impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     /// True if nothing is scattered: a walk ends here and no light need be sampled.
     #[inline]
     pub fn is_black(&self) -> bool {
-        match &self.lambert {
-            Some(lambert) => lambert.reflectance.is_black(),
-            None => self.leaves.is_empty(),
+        match &self.scattering {
+            Scattering::Matt(lambert) => lambert.reflectance.is_black(),
+            Scattering::Lobes { .. } => self.leaves.is_empty(),
         }
     }
 

@@ -19,10 +19,10 @@ pub(super) enum Step {
 
 /// A step and what it starts from.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Link {
+pub struct Link {
     /// Index of the outer link; [`ROOT`] for the point's own frame.
-    pub outer: u8,
-    pub step: Step,
+    pub(super) outer: u8,
+    pub(super) step: Step,
 }
 
 /// The point's own shading frame.

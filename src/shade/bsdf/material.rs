@@ -5,7 +5,7 @@ use super::link::ROOT;
 use super::microfacet::Microfacets;
 use super::node::{Node, PrincipledNode, Resolver, Roughness};
 use super::rough_plastic::Coat;
-use super::{Bsdf, MAX_LEAVES, MAX_LINKS};
+use super::{Bsdf, MAX_LEAVES, MAX_LINKS, Scattering};
 use crate::math::{Frame, Rgb, Vec3};
 use crate::scene::{BsdfDesc, BsdfId, BsdfKind, Diagnostic, Diagnostics, PrincipledDesc, RoughnessDesc, ScalarDesc};
 use crate::shade::SurfacePoint;
@@ -95,19 +95,18 @@ impl Material {
     /// [`Material::resolve`] in place, for loops: a BSDF is large, and most of it is unused most of the time.
     #[inline]
     pub fn resolve_into(&self, bsdf: &mut Bsdf, point: &SurfacePoint, wo: Vec3) {
-        bsdf.clear(point);
         if let Some(sides) = &self.lambert {
             // By the bit of the sign: which side is seen is hard to guess, so there is no branch.
             let cos = wo.dot(point.frame.n);
             let Side { reflectance, turn } = sides[(cos.to_bits() >> 31) as usize];
-            bsdf.lambert = Some(Lambert { n: point.frame.n * turn, reflectance });
+            bsdf.begin(point, Scattering::Matt(Lambert { n: point.frame.n * turn, reflectance }));
             return;
         }
         self.resolve_general(bsdf, point, wo);
     }
 
     fn resolve_general(&self, bsdf: &mut Bsdf, point: &SurfacePoint, wo: Vec3) {
-        bsdf.frame = point.frame;
+        let mut frame = point.frame;
         let mut node = &self.node;
         let mut only_side = None;
         if self.features.opaque() {
@@ -116,16 +115,19 @@ impl Material {
             if let Node::TwoSided { front, back } = node {
                 node = if behind { back } else { front };
                 if behind {
-                    bsdf.frame = Frame { n: -point.frame.n, ..point.frame };
+                    frame = Frame { n: -point.frame.n, ..point.frame };
                     behind = false;
                 }
             }
-            if let Node::Diffuse { reflectance } = node {
-                bsdf.lambert = (!behind).then(|| Lambert { n: bsdf.frame.n, reflectance: reflectance.eval(point) });
+            if let Node::Diffuse { reflectance } = node
+                && !behind
+            {
+                bsdf.begin(point, Scattering::Matt(Lambert { n: frame.n, reflectance: reflectance.eval(point) }));
                 return;
             }
             only_side = Some(usize::from(behind));
         }
+        bsdf.begin(point, Scattering::Lobes { frame, pick_scale: [0.0; 2] });
         Resolver { point, only_side, bsdf }.root(node, ROOT);
     }
 

@@ -8,6 +8,7 @@ mod conductor;
 mod dielectric;
 mod diffuse;
 mod facts;
+mod kept;
 mod link;
 mod lobe;
 mod material;
@@ -23,6 +24,7 @@ mod ward;
 #[cfg(test)]
 mod tests;
 
+pub use kept::{BsdfPool, BsdfRef, KeptBsdf};
 pub use material::{Features, Material, MaterialSet};
 
 use super::{SurfacePoint, Transport};
@@ -31,6 +33,7 @@ use arrayvec::ArrayVec;
 use diffuse::Lambert;
 use link::{Link, ROOT};
 use lobe::{DeltaSample, Lobe, LobeSample};
+use std::ops::Deref;
 
 /// Most lobes a material may have at a point (a two-sided material counts both sides if its tree lets light through).
 pub const MAX_LEAVES: usize = 8;
@@ -60,7 +63,7 @@ pub struct BsdfSample {
 
 /// A lobe with its share of the material.
 #[derive(Clone, Copy, Debug)]
-struct Leaf {
+pub struct Leaf {
     lobe: Lobe,
     /// Multiplies values.
     weight: f32,
@@ -72,24 +75,38 @@ struct Leaf {
     active: [bool; 2],
 }
 
-/// The BSDF at one point: every texture looked up, seen from `wo`. A plain value without heap memory, cheap to make; it
-/// answers for the `wo` it was resolved with, and for any other direction on the same side or, in materials that let light through,
-/// on either side.
+/// The BSDF at one point: every texture looked up, seen from `wo`. It answers for the `wo` it was resolved with, and for any
+/// other direction on the same side or, in materials that let light through, on either side.
 ///
 /// Under bump and normal maps the normal is turned towards the eye where it would face away (as Mitsuba does), so light that is
 /// traced from the other end may find it turned differently: there the adjoint can be positive where the density is zero. All
 /// densities are still functions of the two directions alone, so combinations of techniques stay consistent.
+///
+/// `L` and `K` hold the lobes and the frames: [`Bsdf`] has room for any material, [`BsdfRef`] borrows what a [`BsdfPool`] keeps.
 #[derive(Clone, Debug)]
-pub struct Bsdf {
+pub struct BsdfOf<L, K> {
     ng: Vec3,
-    frame: Frame,
-    leaves: ArrayVec<Leaf, MAX_LEAVES>,
-    links: ArrayVec<Link, MAX_LINKS>,
-    /// 1 / sum of the picks of the active leaves, seen from the front and from the back.
-    pick_scale: [f32; 2],
-    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited: `leaves` stay empty and `frame` is
-    /// left as it was. (Copying it would read in one piece what has just been written in several, and processors stall on that.)
-    lambert: Option<Lambert>,
+    scattering: Scattering,
+    leaves: L,
+    links: K,
+}
+
+/// A BSDF in itself: a plain value without heap memory, cheap to make but large.
+pub type Bsdf = BsdfOf<ArrayVec<Leaf, MAX_LEAVES>, ArrayVec<Link, MAX_LINKS>>;
+
+/// How the lobes make a BSDF.
+#[derive(Clone, Copy, Debug)]
+enum Scattering {
+    /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited: there are no leaves and nothing else
+    /// is written. (Reading in one piece what has just been written in several stalls processors.)
+    Matt(Lambert),
+    /// By `leaves`.
+    Lobes {
+        /// Shading frame.
+        frame: Frame,
+        /// 1 / sum of the picks of the active leaves, seen from the front and from the back.
+        pick_scale: [f32; 2],
+    },
 }
 
 /// Index into the arrays of two sides.
@@ -104,37 +121,40 @@ impl Bsdf {
     pub fn empty(point: &SurfacePoint) -> Bsdf {
         Bsdf {
             ng: point.ng,
-            frame: point.frame,
+            scattering: Scattering::Lobes { frame: point.frame, pick_scale: [0.0; 2] },
             leaves: ArrayVec::new(),
             links: ArrayVec::new(),
-            pick_scale: [0.0; 2],
-            lambert: None,
         }
     }
 
+    /// Starts over at `point`, without lobes.
     #[inline]
-    fn clear(&mut self, point: &SurfacePoint) {
+    fn begin(&mut self, point: &SurfacePoint, scattering: Scattering) {
         self.ng = point.ng;
+        self.scattering = scattering;
         self.leaves.clear();
         self.links.clear();
-        self.pick_scale = [0.0; 2];
-        self.lambert = None;
     }
 
     /// Normalises the choice of lobes; called once all leaves are in.
     #[inline]
     fn seal(&mut self) {
-        if let [leaf] = self.leaves.as_mut_slice() {
+        let scales = if let [leaf] = self.leaves.as_mut_slice() {
             leaf.pick = 1.0;
-            self.pick_scale = leaf.active.map(|a| if a { 1.0 } else { 0.0 });
-            return;
-        }
-        for s in 0..2 {
-            let sum: f32 = self.leaves.iter().filter(|l| l.active[s]).map(|l| l.pick).sum();
-            self.pick_scale[s] = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+            leaf.active.map(|a| if a { 1.0 } else { 0.0 })
+        } else {
+            std::array::from_fn(|s| {
+                let sum: f32 = self.leaves.iter().filter(|l| l.active[s]).map(|l| l.pick).sum();
+                if sum > 0.0 { 1.0 / sum } else { 0.0 }
+            })
+        };
+        if let Scattering::Lobes { pick_scale, .. } = &mut self.scattering {
+            *pick_scale = scales;
         }
     }
+}
 
+impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     /// |wi·ng| / |wo·ng|, the geometric half of the shading-normal factor; 0 for `wo` in the surface, where no light arrives.
     #[inline]
     fn geometric_ratio(&self, wo: Vec3, wi: Vec3) -> f32 {
@@ -151,8 +171,8 @@ impl Bsdf {
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once, sharing their work.
     #[inline]
     pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
-        match &self.lambert {
-            Some(lambert) => {
+        match &self.scattering {
+            Scattering::Matt(lambert) => {
                 let Some((cos_o, cos_i)) = lambert.cosines(wo, wi) else {
                     return (Rgb::BLACK, SolidAnglePdf(0.0));
                 };
@@ -165,15 +185,21 @@ impl Bsdf {
                 };
                 (value, SolidAnglePdf(pdf))
             }
-            None => self.eval_and_pdf_general(wo, wi, mode),
+            Scattering::Lobes { frame, pick_scale } => self.eval_and_pdf_general((frame, pick_scale), wo, wi, mode),
         }
     }
 
-    fn eval_and_pdf_general(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
-        let (o, i) = (self.frame.to_local(wo), self.frame.to_local(wi));
-        let scale = self.pick_scale[side(o.z)];
+    fn eval_and_pdf_general(
+        &self,
+        (frame, pick_scale): (&Frame, &[f32; 2]),
+        wo: Vec3,
+        wi: Vec3,
+        mode: Transport,
+    ) -> (Rgb, SolidAnglePdf) {
+        let (o, i) = (frame.to_local(wo), frame.to_local(wi));
+        let scale = pick_scale[side(o.z)];
         let (mut value, mut pdf) = (Rgb::BLACK, 0.0);
-        for leaf in &self.leaves {
+        for leaf in self.leaves.iter() {
             let (v, p) = leaf.eval_pdf(&self.links, o, i, mode);
             value += v * leaf.weight;
             if leaf.active[side(o.z)] {
@@ -190,11 +216,13 @@ impl Bsdf {
     /// probability is missing from the integral). It does not depend on what the walk carries.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> SolidAnglePdf {
-        match &self.lambert {
-            Some(lambert) => {
+        match &self.scattering {
+            Scattering::Matt(lambert) => {
                 SolidAnglePdf(lambert.cosines(wo, wi).map_or(0.0, |(_, cos_i)| cos_i * std::f32::consts::FRAC_1_PI))
             }
-            None => SolidAnglePdf(self.pdf_local(self.frame.to_local(wo), self.frame.to_local(wi))),
+            Scattering::Lobes { frame, pick_scale } => {
+                SolidAnglePdf(self.pdf_local(pick_scale, frame.to_local(wo), frame.to_local(wi)))
+            }
         }
     }
 
@@ -202,21 +230,21 @@ impl Bsdf {
     /// quantity).
     #[inline]
     pub fn pdf_both(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> (SolidAnglePdf, SolidAnglePdf) {
-        match &self.lambert {
-            Some(lambert) => {
+        match &self.scattering {
+            Scattering::Matt(lambert) => {
                 let (cos_o, cos_i) = lambert.cosines(wo, wi).unwrap_or((0.0, 0.0));
                 let scale = std::f32::consts::FRAC_1_PI;
                 (SolidAnglePdf(cos_i * scale), SolidAnglePdf(cos_o * scale))
             }
-            None => {
-                let (o, i) = (self.frame.to_local(wo), self.frame.to_local(wi));
-                (SolidAnglePdf(self.pdf_local(o, i)), SolidAnglePdf(self.pdf_local(i, o)))
+            Scattering::Lobes { frame, pick_scale } => {
+                let (o, i) = (frame.to_local(wo), frame.to_local(wi));
+                (SolidAnglePdf(self.pdf_local(pick_scale, o, i)), SolidAnglePdf(self.pdf_local(pick_scale, i, o)))
             }
         }
     }
 
     /// Density of `b` given `a` in root coordinates.
-    fn pdf_local(&self, a: Vec3, b: Vec3) -> f32 {
+    fn pdf_local(&self, pick_scale: &[f32; 2], a: Vec3, b: Vec3) -> f32 {
         let s = side(a.z);
         let pdf = |leaf: &Leaf| {
             if !leaf.active[s] {
@@ -230,16 +258,16 @@ impl Bsdf {
                         .map_or(0.0, |inside| leaf.lobe.pdf(inside.eye, inside.light))
                 }
         };
-        self.leaves.iter().map(pdf).sum::<f32>() * self.pick_scale[s]
+        self.leaves.iter().map(pdf).sum::<f32>() * pick_scale[s]
     }
 
     /// Draws a direction; `u` = [lobe, u, v]. `None` if the light is absorbed. Of a smooth event, `value` and `pdf` are what
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] say about the direction, all lobes summed; of a delta event they are those of the event alone.
     #[inline]
     pub fn sample(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
-        match &self.lambert {
-            Some(lambert) => self.smooth_sample(wo, lambert.sample_direction(u), 1.0, mode),
-            None => self.sample_general(wo, u, mode),
+        match &self.scattering {
+            Scattering::Matt(lambert) => self.smooth_sample(wo, lambert.sample_direction(u), 1.0, mode),
+            Scattering::Lobes { frame, pick_scale } => self.sample_general((frame, pick_scale), wo, u, mode),
         }
     }
 
@@ -258,14 +286,20 @@ impl Bsdf {
         })
     }
 
-    fn sample_general(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
-        let o = self.frame.to_local(wo);
+    fn sample_general(
+        &self,
+        (root, pick_scale): (&Frame, &[f32; 2]),
+        wo: Vec3,
+        u: [f32; 3],
+        mode: Transport,
+    ) -> Option<BsdfSample> {
+        let o = root.to_local(wo);
         let s = side(o.z);
-        let (leaf, share, rest) = self.pick(s, u[0])?;
+        let (leaf, share, rest) = self.pick(s, pick_scale[s], u[0])?;
         let (frame, a) = link::frame_of(&self.links, leaf.link, o);
         match leaf.lobe.sample(a, [rest, u[1], u[2]])? {
             LobeSample::Smooth(b) => {
-                let wi = self.frame.to_world(frame.to_world(b)).normalize();
+                let wi = root.to_world(frame.to_world(b)).normalize();
                 let eta = leaf.lobe.eta();
                 let crossed = a.z * b.z < 0.0;
                 let eta = match (crossed, a.z > 0.0) {
@@ -275,15 +309,17 @@ impl Bsdf {
                 };
                 self.smooth_sample(wo, wi, eta, mode)
             }
-            LobeSample::Delta(event) => self.delta_sample(wo, leaf, share, (frame, a), event, mode),
+            LobeSample::Delta(event) => {
+                self.delta_sample((root, pick_scale), wo, (leaf, share), (frame, a), event, mode)
+            }
         }
     }
 
     /// Chooses a leaf: the leaf, its probability, and what is left of the random number.
-    fn pick(&self, s: usize, u: f32) -> Option<(&Leaf, f32, f32)> {
+    fn pick(&self, s: usize, scale: f32, u: f32) -> Option<(&Leaf, f32, f32)> {
         let (mut rest, mut last) = (u, None);
         for leaf in self.leaves.iter().filter(|l| l.active[s]) {
-            let share = leaf.pick * self.pick_scale[s];
+            let share = leaf.pick * scale;
             if share > 0.0 {
                 if rest < share {
                     return Some((leaf, share, (rest / share).min(crate::math::float::ONE_MINUS_EPSILON)));
@@ -299,16 +335,16 @@ impl Bsdf {
     /// A discrete event of `leaf`, which is chosen with probability `share` and whose frame and view in it are `inner`.
     fn delta_sample(
         &self,
+        (root, pick_scale): (&Frame, &[f32; 2]),
         wo: Vec3,
-        leaf: &Leaf,
-        share: f32,
+        (leaf, share): (&Leaf, f32),
         inner: (Frame, Vec3),
         event: DeltaSample,
         mode: Transport,
     ) -> Option<BsdfSample> {
         let (frame, a) = inner;
-        let (o, i) = (self.frame.to_local(wo), frame.to_world(event.b));
-        let wi = if event.passes_through { -wo } else { self.frame.to_world(i).normalize() };
+        let (o, i) = (root.to_local(wo), frame.to_world(event.b));
+        let wi = if event.passes_through { -wo } else { root.to_world(i).normalize() };
         let mut value = event.value * leaf.weight;
         let mut reverse_value = value;
         if !event.passes_through {
@@ -328,7 +364,7 @@ impl Bsdf {
                 value *= event.eta * event.eta * self.geometric_ratio(wo, wi) * a.z.abs() / cos;
             }
         }
-        let reverse = if leaf.active[side(i.z)] { leaf.pick * self.pick_scale[side(i.z)] } else { 0.0 };
+        let reverse = if leaf.active[side(i.z)] { leaf.pick * pick_scale[side(i.z)] } else { 0.0 };
         Some(BsdfSample {
             wi,
             value,
@@ -345,7 +381,7 @@ impl Bsdf {
     /// whichever side the point is reached.
     #[inline]
     pub fn albedo(&self) -> Rgb {
-        if let Some(lambert) = &self.lambert {
+        if let Scattering::Matt(lambert) = &self.scattering {
             return lambert.reflectance;
         }
         let seen =
@@ -357,13 +393,16 @@ impl Bsdf {
     /// It scatters as a matt surface does, and in no other way.
     #[inline]
     pub fn is_lambertian(&self) -> bool {
-        self.lambert.is_some()
+        matches!(self.scattering, Scattering::Matt(_))
     }
 
     /// True if a connection to this point can carry light: some lobe is not a delta.
     #[inline]
     pub fn connectable(&self) -> bool {
-        self.lambert.is_some_and(|l| !l.reflectance.is_black()) || self.leaves.iter().any(|leaf| leaf.lobe.is_smooth())
+        match &self.scattering {
+            Scattering::Matt(lambert) => !lambert.reflectance.is_black(),
+            Scattering::Lobes { .. } => self.leaves.iter().any(|leaf| leaf.lobe.is_smooth()),
+        }
     }
 }
 

@@ -1,0 +1,103 @@
+//! BSDFs that are kept: only the lobes that there are, side by side with those of others.
+
+use super::link::Link;
+use super::{Bsdf, BsdfOf, Leaf, Scattering};
+use crate::math::Vec3;
+
+/// A BSDF whose lobes are elsewhere.
+pub type BsdfRef<'a> = BsdfOf<&'a [Leaf], &'a [Link]>;
+
+/// Lobes and frames of many BSDFs.
+#[derive(Clone, Debug, Default)]
+pub struct BsdfPool {
+    leaves: Vec<Leaf>,
+    links: Vec<Link>,
+}
+
+/// A BSDF in a pool.
+#[derive(Clone, Copy, Debug)]
+pub struct KeptBsdf {
+    scattering: Scattering,
+    first_leaf: u32,
+    first_link: u32,
+    leaves: u8,
+    links: u8,
+}
+
+/// How far lobes went when their pool was appended to another.
+#[derive(Clone, Copy, Debug)]
+pub struct Moved {
+    leaves: u32,
+    links: u32,
+}
+
+impl KeptBsdf {
+    /// The same in the pool that its own was appended to.
+    #[inline]
+    #[must_use]
+    pub fn moved(self, by: Moved) -> KeptBsdf {
+        KeptBsdf { first_leaf: self.first_leaf + by.leaves, first_link: self.first_link + by.links, ..self }
+    }
+}
+
+impl BsdfPool {
+    /// Takes in a BSDF.
+    #[inline]
+    pub fn keep(&mut self, bsdf: &Bsdf) -> KeptBsdf {
+        self.keep_parts(bsdf.scattering, &bsdf.leaves, &bsdf.links)
+    }
+
+    /// Takes in a BSDF that `other` keeps.
+    #[inline]
+    pub fn keep_from(&mut self, kept: &KeptBsdf, other: &BsdfPool) -> KeptBsdf {
+        self.keep_parts(kept.scattering, other.leaves(kept), other.links(kept))
+    }
+
+    #[inline]
+    fn keep_parts(&mut self, scattering: Scattering, leaves: &[Leaf], links: &[Link]) -> KeptBsdf {
+        let kept = KeptBsdf {
+            scattering,
+            first_leaf: self.leaves.len() as u32,
+            first_link: self.links.len() as u32,
+            leaves: leaves.len() as u8,
+            links: links.len() as u8,
+        };
+        // Nearly always there is nothing.
+        if !leaves.is_empty() {
+            self.leaves.extend_from_slice(leaves);
+            self.links.extend_from_slice(links);
+        }
+        kept
+    }
+
+    #[inline]
+    fn leaves(&self, kept: &KeptBsdf) -> &[Leaf] {
+        &self.leaves[kept.first_leaf as usize..][..usize::from(kept.leaves)]
+    }
+
+    #[inline]
+    fn links(&self, kept: &KeptBsdf) -> &[Link] {
+        &self.links[kept.first_link as usize..][..usize::from(kept.links)]
+    }
+
+    /// A BSDF that was kept, at a point with the geometric normal `ng`.
+    #[inline]
+    pub fn get(&self, kept: &KeptBsdf, ng: Vec3) -> BsdfRef<'_> {
+        BsdfOf { ng, scattering: kept.scattering, leaves: self.leaves(kept), links: self.links(kept) }
+    }
+
+    /// Takes in all that `other` keeps; BSDFs kept there are to be [moved](KeptBsdf::moved) by what is returned.
+    pub fn append(&mut self, other: &BsdfPool) -> Moved {
+        let moved = Moved { leaves: self.leaves.len() as u32, links: self.links.len() as u32 };
+        self.leaves.extend_from_slice(&other.leaves);
+        self.links.extend_from_slice(&other.links);
+        moved
+    }
+
+    /// Forgets all, but not its memory.
+    #[inline]
+    pub fn clear(&mut self) {
+        self.leaves.clear();
+        self.links.clear();
+    }
+}
