@@ -135,6 +135,7 @@ fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
         light: &light_nodes,
         light_joint,
         eye: &eye_nodes,
+        eye_lit: &[],
         eye_joint,
         next_event: d.next_event as f32,
         light_can_be_hit: d.joinable[0],

@@ -2,6 +2,7 @@
 //! sampling, density and inverse. Unlike piecewise constant ones they are positive wherever an interpolated picture is.
 
 use super::float::ONE_MINUS_EPSILON;
+use std::ops::Range;
 
 /// The s in [0, 1] below which the fraction `r` of the mass under a linear density from `a` to `b` lies.
 fn invert_linear(a: f64, b: f64, r: f64) -> f64 {
@@ -45,6 +46,8 @@ pub struct PiecewiseLinear {
     values: Vec<f64>,
     /// Mass below each node.
     cdf: Vec<f64>,
+    /// For as many equal parts of the unit interval as there are cells, the last cell that begins at or below the part's start.
+    guide: Vec<u32>,
     integral: f64,
 }
 
@@ -67,7 +70,10 @@ impl PiecewiseLinear {
             return None;
         }
         cdf.iter_mut().chain(values.iter_mut()).for_each(|v| *v /= sum);
-        Some(PiecewiseLinear { values, cdf, integral: sum })
+        let cells = values.len() - 1;
+        let start = |part: usize| cdf[1..cells].partition_point(|&c| c <= part as f64 / cells as f64) as u32;
+        let guide = (0..=cells).map(start).collect();
+        Some(PiecewiseLinear { values, cdf, guide, integral: sum })
     }
 
     /// Integral of the function that was given.
@@ -78,7 +84,9 @@ impl PiecewiseLinear {
     /// A position in [0, 1] and its density.
     pub fn sample(&self, u: f32) -> (f32, f32) {
         let u = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON));
-        let i = find_cell(self.values.len() - 1, u, |k| self.cdf[k]);
+        let cells = self.values.len() - 1;
+        let part = ((u * cells as f64) as usize).min(cells - 1);
+        let i = find_cell(self.guide[part] as usize..self.guide[part + 1] as usize + 1, u, |k| self.cdf[k]);
         let r = (u - self.cdf[i]) / (self.cdf[i + 1] - self.cdf[i]);
         let s = invert_linear(self.values[i], self.values[i + 1], r);
         let x = ((i as f64 + s) / (self.values.len() - 1) as f64) as f32;
@@ -101,9 +109,9 @@ impl PiecewiseLinear {
     }
 }
 
-/// The cell i with cdf(i) ≤ target < cdf(i + 1), a cell with mass even if rounding puts the target beyond the last.
-fn find_cell(cells: usize, target: f64, cdf: impl Fn(usize) -> f64) -> usize {
-    let (mut low, mut high) = (0, cells);
+/// The cell i of `cells` with cdf(i) ≤ target < cdf(i + 1), a cell with mass even if rounding puts the target beyond the last.
+fn find_cell(cells: Range<usize>, target: f64, cdf: impl Fn(usize) -> f64) -> usize {
+    let (mut low, mut high) = (cells.start, cells.end);
     while high - low > 1 {
         let mid = (low + high) / 2;
         if cdf(mid) <= target { low = mid } else { high = mid }

@@ -31,38 +31,31 @@ pub struct Node {
     pub smooth: bool,
     /// Light side: c of the connection that ends at this vertex, see `mis::resampled`.
     pub factor: f32,
-    /// Eye side: what is known of the light there is at this vertex, on the side that the walk goes on to.
+}
+
+/// What weights that know of resampling ask about a vertex of an eye sub-path, for the light that a walk from the other end would bring.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lit {
+    /// What is known of the light there is, on the side that the walk goes on to.
     pub there: There,
-    /// Eye side: |cos| at this vertex between its surface's normal and the edge to the vertex before.
+    /// |cos| between the surface's normal and the edge to the vertex before.
     pub cos: f32,
-    /// Eye side: square of the distance to the vertex before.
+    /// Square of the distance to the vertex before.
     pub distance2: f32,
-    /// Eye side: value of this vertex for a walk from the light, cosine weighted.
+    /// Value of the vertex for a walk from the light, cosine weighted.
     pub adjoint: Rgb,
-    /// Eye side: density per steradian with which a walk from the light would go on from here to the vertex before.
+    /// Density per steradian with which a walk from the light would go on from here to the vertex before.
     pub reverse: f32,
 }
 
 impl Node {
-    fn plain(forward: AreaPdf) -> Node {
-        Node {
-            forward,
-            spread: 0.0,
-            survival: 1.0,
-            ratio: 0.0,
-            smooth: true,
-            factor: 1.0,
-            there: There::default(),
-            cos: 0.0,
-            distance2: 0.0,
-            adjoint: Rgb::BLACK,
-            reverse: 0.0,
-        }
+    fn plain(forward: AreaPdf, spread: f32, survival: f32) -> Node {
+        Node { forward, spread, survival, ratio: 0.0, smooth: true, factor: 1.0 }
     }
 
     /// The origin of a sub-path.
     pub fn origin(forward: AreaPdf) -> Node {
-        Node { spread: 0.0, survival: 1.0, ..Node::plain(forward) }
+        Node::plain(forward, 0.0, 1.0)
     }
 }
 
@@ -76,15 +69,28 @@ pub fn spread(cos: f32, dist2: f32) -> f32 {
 #[derive(Clone, Debug, Default)]
 pub struct Side {
     nodes: Vec<Node>,
+    /// One for each node, or none at all.
+    lit: Vec<Lit>,
+    aware: bool,
     cos_leaving: f32,
 }
 
 impl Side {
-    /// Starts over at an origin of the given density.
-    pub fn begin(&mut self, origin: AreaPdf) {
+    /// Starts over at an origin of the given density; `aware` of the light at its vertices or not.
+    pub fn begin(&mut self, origin: AreaPdf, aware: bool) {
         self.nodes.clear();
+        self.lit.clear();
+        self.aware = aware;
         self.cos_leaving = 0.0;
-        self.nodes.push(Node::origin(origin));
+        self.push(Node::origin(origin), 0.0, 0.0);
+    }
+
+    #[inline]
+    fn push(&mut self, node: Node, cos: f32, distance2: f32) {
+        self.nodes.push(node);
+        if self.aware {
+            self.lit.push(Lit { cos, distance2, ..Lit::default() });
+        }
     }
 
     /// The walk arrived on a surface from another vertex that is not a light's; `survival` is that of a walk from the other end there. The
@@ -95,7 +101,7 @@ impl Side {
         let distance2 = edge.distance * edge.distance;
         let forward = SolidAnglePdf(edge.pdf.0 * edge.survival).to_area(cos, distance2);
         let spread = spread(self.cos_leaving, distance2);
-        self.nodes.push(Node { spread, survival, cos: cos.abs(), distance2, ..Node::plain(forward) });
+        self.push(Node::plain(forward, spread, survival), cos.abs(), distance2);
         forward
     }
 
@@ -108,7 +114,7 @@ impl Side {
     /// The walk arrived at its next vertex, with densities of the light's own.
     #[inline]
     pub fn arrive(&mut self, forward: AreaPdf, spread: f32, survival: f32) {
-        self.nodes.push(Node { spread, survival, ..Node::plain(forward) });
+        self.push(Node::plain(forward, spread, survival), 0.0, 0.0);
     }
 
     /// The walk leaves its last vertex, `vertex`, by `sample`; `back` is the transport of a walk from the other end. Returned is the
@@ -138,6 +144,18 @@ impl Side {
     #[inline]
     pub fn last_mut(&mut self) -> Option<&mut Node> {
         self.nodes.last_mut()
+    }
+
+    /// What is known of the light at the last vertex, if the walk is aware of it.
+    #[inline]
+    pub fn last_lit_mut(&mut self) -> Option<&mut Lit> {
+        self.lit.last_mut()
+    }
+
+    /// What is known of the light at all vertices; nothing if the walk is not aware of it.
+    #[inline]
+    pub fn lit(&self) -> &[Lit] {
+        &self.lit
     }
 
     /// The first `n` vertices.

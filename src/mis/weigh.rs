@@ -13,7 +13,7 @@
 //! draw their light point as seen from v_1 (*next event*) and not as light sub-paths do; `mis::resampled` tells that of a
 //! resampled connection; all others are 1, or 0 if an end of the connection is a delta event. Roulette is part of the densities: where it is played is counted from the end that walks.
 
-use super::side::Node;
+use super::side::{Lit, Node};
 use super::{Heuristic, Resampled, Targets, Techniques};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::Limits;
@@ -37,6 +37,8 @@ pub struct Split<'a> {
     pub light_joint: Joint,
     /// The t vertices of the eye sub-path that it uses.
     pub eye: &'a [Node],
+    /// What is known of the light at these vertices. Unused unless connections are resampled.
+    pub eye_lit: &'a [Lit],
     /// How the light sub-path would have gone on into them; unused if t = 1.
     pub eye_joint: Joint,
     /// c_1: density of v_0 under next event from v_1 over its density as origin of a light sub-path.
@@ -156,23 +158,23 @@ impl Weigher {
     /// made of the eye's vertices brings its light along.
     fn eye_factor(&self, resampled: &Resampled, path: &Split, n: usize, arriving: &mut Rgb) -> f32 {
         let (eye, s) = (path.eye, path.light.len());
-        let (t, node) = (eye.len(), &eye[n]);
+        let (t, node, lit) = (eye.len(), &eye[n], &path.eye_lit[n]);
         let (adjoint, reverse) = match n + 1 == t {
             // z_{t−1} is on the light, and what arrives at z_{t−2} is given.
             true if s == 0 => return 1.0,
             true => (path.adjoint, path.eye_joint.departure.0),
-            false => (node.adjoint, node.reverse),
+            false => (lit.adjoint, lit.reverse),
         };
         let scattered = *arriving * adjoint;
         let brings = Targets {
             scattered: scattered.luminance() * node.spread,
-            unscattered: arriving.luminance() * node.cos * node.spread,
+            unscattered: arriving.luminance() * lit.cos * node.spread,
         };
         *arriving = scattered * (1.0 / (reverse * self.survival(node, t - 1 - n + s)));
         if n < 2 {
             return 1.0;
         }
-        resampled.factor(brings, node.distance2, eye[n - 1].there)
+        resampled.factor(brings, lit.distance2, path.eye_lit[n - 1].there)
     }
 
     /// The weight of the technique that sampled the path, and of kinds of techniques.

@@ -1,6 +1,7 @@
 //! Morton order: a curve through space along which neighbours stay close (Morton 1966).
 
 use crate::math::Vec3;
+use rayon::prelude::*;
 
 /// Spreads the lower ten bits of `x` three apart.
 fn spread(x: u32) -> u32 {
@@ -33,7 +34,8 @@ pub fn codes(points: &[Vec3], out: &mut Vec<u32>) {
 pub fn order(points: &[Vec3]) -> Vec<u32> {
     let [lo, hi] = bounds(points);
     let mut keys: Vec<(u32, u32)> = points.iter().zip(0..).map(|(p, i)| (code(*p, lo, hi), i)).collect();
-    keys.sort_unstable();
+    // All keys differ: the order is the same for any number of threads.
+    keys.par_sort_unstable();
     keys.into_iter().map(|(_, i)| i).collect()
 }
 

@@ -44,7 +44,7 @@ pub(in crate::integrators) struct Candidate<'a> {
     pub next_event: f32,
     /// See `mis::weigh`.
     pub light_can_be_hit: bool,
-    /// y_0.
+    /// y_0; nothing if it was drawn from many.
     pub origin: Option<Origin>,
     /// Number of the sub-path among those of the iteration, if it was drawn from many.
     pub number: Option<u32>,
@@ -110,9 +110,11 @@ impl EyeHooks<'_, '_> {
         let note = self.record.as_mut().map_or(0, |record| {
             // z_1 … z_{t−1}, of which the last is the light's vertex if the walk hit it.
             let n_eye = if s == 0 { t - 2 } else { t - 1 };
-            if let Some(number) = number {
-                record.light = LightStore::retrace(this, iteration, number);
-            }
+            let origin = number.map_or(origin, |number| {
+                let (light, origin) = LightStore::retrace(this, iteration, number);
+                record.light = light;
+                origin
+            });
             let path = origin.map(|origin| record.path(origin, s, n_eye, lens));
             let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(There::default(), |r| r.there(p, d));
             record.found(scene, weigher, &there, Contribution::new((s, t), pixel, raw, weight.own), path)
@@ -153,6 +155,7 @@ impl EyeHooks<'_, '_> {
             light: &[],
             light_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             eye: self.side.nodes(),
+            eye_lit: self.side.lit(),
             eye_joint: Joint { arrival: origin, departure },
             next_event,
             light_can_be_hit: true,
@@ -242,6 +245,7 @@ impl EyeHooks<'_, '_> {
                 departure: SolidAnglePdf(0.0),
             },
             eye: self.side.first(t),
+            eye_lit: self.side.lit(),
             eye_joint: Joint { arrival: sample.end.next_density(position, emission, cos, dist2), departure: back.1 },
             next_event: density.0 * to_area / origin.0,
             light_can_be_hit: !light.is_delta(),
@@ -297,6 +301,7 @@ impl EyeHooks<'_, '_> {
                 departure: to.bsdf.pdf(-to_light, light.wo, Transport::Radiance),
             },
             eye: self.side.first(t),
+            eye_lit: self.side.lit(),
             eye_joint: Joint { arrival: AreaPdf(light_pdf * spread_z), departure: back.1 },
             next_event: to.next_event,
             light_can_be_hit: to.light_can_be_hit,
@@ -368,8 +373,8 @@ impl WalkHooks for EyeHooks<'_, '_> {
             } else {
                 vertex.bsdf.eval(sample.wi, vertex.wo, Transport::Importance)
             };
-            if let Some(node) = self.side.last_mut() {
-                (node.there, node.adjoint, node.reverse) = (there, value, reverse.0);
+            if let Some(lit) = self.side.last_lit_mut() {
+                (lit.there, lit.adjoint, lit.reverse) = (there, value, reverse.0);
             }
         }
         if let Some(record) = &mut self.record {

@@ -5,7 +5,7 @@ use crate::emit::{EmissionSample, LensSample, LightEnd, LightId};
 use crate::integrators::replay::{Contribution, Replay};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{Joint, Node, Side, Split, Targets, There, Weight, spread};
+use crate::mis::{Joint, Lit, Node, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
@@ -92,7 +92,7 @@ pub(in crate::integrators) fn trace(
     let light = scene.lights.get(id);
     let Some(emission) = light.sample_emission([u[1], u[2]], [v[0], v[1]]) else { return };
     let origin = emission.vertex_density() * chosen;
-    out.side.begin(origin);
+    out.side.begin(origin, false);
     out.light_can_be_hit = !light.is_delta();
     let flux = emission.flux() * (1.0 / chosen.0);
     out.origin = Some(Origin { light: id, end: emission.end, leaving: emission.direction, flux });
@@ -228,6 +228,7 @@ impl LightHooks<'_, '_> {
             light: self.out.side.first(1),
             light_joint: Joint { arrival: AreaPdf(direction.0 * to_area), departure: SolidAnglePdf(0.0) },
             eye: &[Node::origin(lens.pdf)],
+            eye_lit: &[Lit::default()],
             eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             next_event: 1.0,
             light_can_be_hit: !light.is_delta(),
@@ -258,6 +259,7 @@ impl LightHooks<'_, '_> {
             light: self.out.side.first(s),
             light_joint: Joint { arrival: AreaPdf(direction.0 * to_area), departure: back },
             eye: &[Node::origin(lens.pdf)],
+            eye_lit: &[Lit::default()],
             eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             next_event: self.out.next_event,
             light_can_be_hit: self.out.light_can_be_hit,

@@ -265,7 +265,7 @@ impl Bidirectional {
         let raster = [x as f32 + 0.5 + offset[0], y as f32 + 0.5 + offset[1]];
         let eye = scene.camera.sample_ray(raster, [u[2], u[3]]);
         let (lens, direction) = scene.camera.pdf_sampled_ray(eye.direction);
-        worker.eye.begin(lens);
+        worker.eye.begin(lens, self.weigher.resampled.is_some());
         let mut hooks = EyeHooks {
             this: self,
             scene,

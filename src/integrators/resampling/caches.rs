@@ -39,6 +39,18 @@ pub(super) struct Cache {
 /// What a cache point found: the two targets (scattered first), and what it alone found of the first.
 pub(super) type Found = [f64; 3];
 
+/// What is known at a cache point: half a line of a cache, mostly.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Known {
+    p: Vec3,
+    /// One over the squared distance at which nothing is like here any more.
+    unlike_at: f32,
+    side: Vec3,
+    /// Means of [`Found`] over all iterations so far.
+    means: [f32; 3],
+}
+
 /// A fixed set of cache points with their estimates.
 #[derive(Debug)]
 pub(in crate::integrators) struct Caches {
@@ -48,8 +60,8 @@ pub(in crate::integrators) struct Caches {
     pub groups: Vec<Range<usize>>,
     /// For each point, three others of its group that are nearest: bits of their places in the group.
     pub companions: Vec<u16>,
-    /// For each point one over the squared distance at which nothing is like there any more.
-    unlike_at: Vec<f32>,
+    /// What is asked of each point at every vertex, in one piece.
+    known: Vec<Known>,
     /// Sum over iterations of what each point found, and their number.
     sums: Vec<Found>,
     iterations: u64,
@@ -137,8 +149,9 @@ impl Caches {
             let far = FAR * FAR * sum / group.len() as f32;
             std::iter::repeat_n((1.0 / far).min(f32::MAX), group.len())
         });
-        let unlike_at = unlike_at.collect();
-        (Caches { index, ends, groups, companions, unlike_at, sums: vec![[0.0; 3]; all.len()], iterations: 0 }, stats)
+        let know = |(c, unlike_at): (&Cache, f32)| Known { p: c.p, unlike_at, side: c.side, means: [0.0; 3] };
+        let known = all.iter().zip(unlike_at).map(know).collect();
+        (Caches { index, ends, groups, companions, known, sums: vec![[0.0; 3]; all.len()], iterations: 0 }, stats)
     }
 
     /// A cache point's end of a shadow ray.
@@ -162,20 +175,22 @@ impl Caches {
     /// Means over iterations so far of what the cache points around `p` whose side is `n` found.
     #[inline]
     pub fn there(&self, p: Vec3, n: Vec3) -> There {
-        let (mut sum, mut count, mut unlike, mut blur2) = ([0.0; 3], 0.0, 1.0f32, 0.0f32);
-        for i in self.index.find(p, n) {
-            let own = self.sums[i];
-            sum = std::array::from_fn(|k| sum[k] + own[k]);
-            count += self.iterations as f64;
-            let (q, m) = (self.index.points()[i], self.index.normals()[i]);
-            blur2 = blur2.max(1.0 / (self.unlike_at[i] * (FAR * FAR)));
-            unlike = unlike.min(p.distance_squared(q) * self.unlike_at[i] + TILT * (1.0 - n.dot(m)));
-        }
-        if count <= 0.0 {
+        if self.iterations == 0 {
             return There::default();
         }
-        let all = Targets { scattered: (sum[0] / count) as f32, unscattered: (sum[1] / count) as f32 };
-        let missed = if sum[0] > 0.0 { (sum[2] / sum[0]) as f32 } else { 0.0 };
+        let (mut sum, mut count, mut unlike, mut blur2) = ([0.0; 3], 0.0, 1.0f32, 0.0f32);
+        for i in self.index.find(p, n) {
+            let known = &self.known[i];
+            sum = std::array::from_fn(|k| sum[k] + known.means[k]);
+            count += 1.0;
+            blur2 = blur2.max(1.0 / (known.unlike_at * (FAR * FAR)));
+            unlike = unlike.min(p.distance_squared(known.p) * known.unlike_at + TILT * (1.0 - n.dot(known.side)));
+        }
+        if count == 0.0 {
+            return There::default();
+        }
+        let all = Targets { scattered: sum[0] / count, unscattered: sum[1] / count };
+        let missed = if sum[0] > 0.0 { sum[2] / sum[0] } else { 0.0 };
         There { all, missed: missed.max(unlike), blur2 }
     }
 
@@ -185,6 +200,14 @@ impl Caches {
             *sum = std::array::from_fn(|k| sum[k] + own[k]);
         }
         self.iterations += 1;
+        self.know();
+    }
+
+    fn know(&mut self) {
+        let n = self.iterations as f64;
+        for (known, sums) in self.known.iter_mut().zip(&self.sums) {
+            known.means = sums.map(|sum| if n > 0.0 { (sum / n) as f32 } else { 0.0 });
+        }
     }
 
     /// What must be saved to go on later: the sums, and the number of iterations behind them.
@@ -197,6 +220,7 @@ impl Caches {
         let fits = sums.len() == self.sums.len();
         if fits {
             (self.sums, self.iterations) = (sums, iterations);
+            self.know();
         }
         fits
     }

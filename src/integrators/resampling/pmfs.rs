@@ -41,12 +41,48 @@ pub(super) struct GroupPmf {
     entries: Vec<Entry>,
     /// Entries of each cache point: of `entries` or, with one stage, all vertices.
     count: usize,
-    /// For each cache point and entry, the sum of what the entries up to it bring, over the whole: cumulative probabilities. All zero
-    /// where nothing is brought.
-    cdf: Vec<f32>,
+    /// For each cache point and entry, what it brings, and then the sum of what the entries up to it bring, over the whole: cumulative
+    /// probabilities. All zero where nothing is brought. Each row is filled up with ones to whole blocks.
+    cdf: Vec<Block>,
+    /// For each cache point, the last of each block: where a search begins.
+    ends: Vec<f32>,
     /// For each cache point, what it found.
     found: Vec<Found>,
     ranges: Vec<Range<usize>>,
+}
+
+/// Entries that a search compares at once.
+const BLOCK: usize = 16;
+
+/// A part of a row of probabilities, one line of a cache.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+struct Block([f32; BLOCK]);
+
+/// The cumulative probabilities of a cache point.
+#[derive(Clone, Copy, Debug)]
+struct Row<'a> {
+    blocks: &'a [Block],
+    ends: &'a [f32],
+}
+
+impl Row<'_> {
+    #[inline]
+    fn cumulative(&self, e: usize) -> f32 {
+        self.blocks[e / BLOCK].0[e % BLOCK]
+    }
+
+    #[inline]
+    fn probability(&self, e: usize) -> f32 {
+        self.cumulative(e) - if e == 0 { 0.0 } else { self.cumulative(e - 1) }
+    }
+
+    /// The number of entries whose cumulative probabilities are at most u.
+    #[inline]
+    fn find(&self, u: f32) -> usize {
+        let b = self.ends.partition_point(|&end| end <= u).min(self.blocks.len() - 1);
+        b * BLOCK + self.blocks[b].0.iter().filter(|&&c| c <= u).count()
+    }
 }
 
 /// A choice among entries.
@@ -67,10 +103,17 @@ pub(super) struct Pmfs {
 }
 
 impl GroupPmf {
+    /// Blocks of a row.
+    fn blocks(&self) -> usize {
+        self.count.div_ceil(BLOCK)
+    }
+
+    /// The probabilities of a cache point, if anything is brought to it.
     #[inline]
-    fn row(&self, cache: usize) -> Option<&[f32]> {
-        let cdf = &self.cdf[(cache - self.first) * self.count..][..self.count];
-        cdf.last().is_some_and(|&top| top > 0.0).then_some(cdf)
+    fn row(&self, cache: usize) -> Option<Row<'_>> {
+        let (blocks, at) = (self.blocks(), (cache - self.first) * self.blocks());
+        let ends = &self.ends[at..at + blocks];
+        ends.last().is_some_and(|&top| top > 0.0).then(|| Row { blocks: &self.cdf[at..at + blocks], ends })
     }
 
     /// The first stage: draws one vertex of each cluster of a cut.
@@ -94,8 +137,10 @@ impl GroupPmf {
     /// The last stage: what every entry brings to every cache point of the group.
     fn fill(&mut self, caches: &Caches, group: &Range<usize>, store: &LightStore, tracer: &mut Tracer) {
         self.first = group.start;
+        let blocks = self.blocks();
         self.cdf.clear();
-        self.cdf.resize(group.len() * self.count, 0.0);
+        self.cdf.resize(group.len() * blocks, Block::default());
+        self.ends.clear();
         self.found.clear();
         self.found.resize(group.len(), [0.0; 3]);
         let (points, sides) = (&caches.index.points()[group.clone()], &caches.index.normals()[group.clone()]);
@@ -121,30 +166,32 @@ impl GroupPmf {
             let seen = asked[..packet.len].iter().enumerate().filter(|(i, _)| blocked >> i & 1 == 0);
             let by = seen.clone().fold(0u16, |by, (_, (c, _))| by | 1 << c);
             for (_, &(c, brings)) in seen {
-                self.cdf[c * self.count + e] = brings;
+                self.cdf[c * blocks + e / BLOCK].0[e % BLOCK] = brings;
                 if caches.companions[group.start + c] & by == 0 {
                     self.found[c][2] += f64::from(brings);
                 }
             }
         }
         if self.count > 0 {
-            for (cdf, found) in self.cdf.chunks_exact_mut(self.count).zip(&mut self.found) {
-                found[0] = accumulate(cdf);
+            for (cdf, found) in self.cdf.chunks_exact_mut(blocks).zip(&mut self.found) {
+                found[0] = accumulate(cdf, self.count);
+                self.ends.extend(cdf.iter().map(|block| block.0[BLOCK - 1]));
                 *found = found.map(|sum| sum / f64::from(store.paths_traced));
             }
         }
     }
 }
 
-/// Turns what entries bring into cumulative probabilities; returns the sum.
-fn accumulate(cdf: &mut [f32]) -> f64 {
-    let mut sum = 0.0f64;
-    for c in cdf.iter_mut() {
-        sum += f64::from(*c);
-        *c = sum as f32;
-    }
+/// Turns what the first `count` entries bring into cumulative probabilities, which end in exactly one; returns the sum.
+fn accumulate(blocks: &mut [Block], count: usize) -> f64 {
+    let all = || blocks.iter().flat_map(|b| b.0).take(count);
+    let sum: f64 = all().map(f64::from).sum();
     if sum > 0.0 {
-        cdf.iter_mut().for_each(|c| *c = (f64::from(*c) / sum) as f32);
+        let mut below = 0.0;
+        for c in blocks.iter_mut().flat_map(|b| &mut b.0) {
+            below += f64::from(*c);
+            *c = (below / sum) as f32;
+        }
     }
     sum
 }
@@ -203,7 +250,7 @@ impl Pmfs {
             return None;
         }
         let n = caches.len().min(3);
-        let mut rows: [Option<&[f32]>; 3] = [None; 3];
+        let mut rows: [Option<Row>; 3] = [None; 3];
         for (row, &cache) in rows.iter_mut().zip(caches) {
             *row = self.groups[self.group_of[cache] as usize].row(cache);
         }
@@ -211,22 +258,50 @@ impl Pmfs {
         let share = 1.0 / (n + 1) as f32;
         let chosen = ((u[0] * (n + 1) as f32) as usize).min(n);
         let e = match rows.get(chosen) {
-            Some(Some(cdf)) if chosen < n => cdf.partition_point(|&c| c <= u[1]),
+            Some(Some(row)) if chosen < n => row.find(u[1]),
             // A cache point that no light vertex reaches draws uniformly, as the last share does.
             _ => (u[1] * entries as f32) as usize,
         }
         .min(entries - 1);
         let mut p = share * uniform;
-        for cdf in &rows[..n] {
-            p += share
-                * match cdf {
-                    Some(cdf) => cdf[e] - if e == 0 { 0.0 } else { cdf[e - 1] },
-                    None => uniform,
-                };
+        for row in &rows[..n] {
+            p += share * row.map_or(uniform, |row| row.probability(e));
         }
         Some(match group.entries.get(e) {
             Some(entry) => Choice { vertex: entry.vertex as usize, probability: p / entry.stands_for },
             None => Choice { vertex: e, probability: p },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_search_by_blocks_finds_what_a_plain_one_finds() {
+        let mut rng = HashRng::new(9, 8, 7, 6);
+        for count in [1usize, 2, 15, 16, 17, 32, 200, 333] {
+            let mut blocks = vec![Block::default(); count.div_ceil(BLOCK)];
+            for e in 0..count {
+                let [u, v, ..] = rng.next_4();
+                // Many entries bring nothing.
+                blocks[e / BLOCK].0[e % BLOCK] = if u < 0.5 { 0.0 } else { v };
+            }
+            blocks[0].0[0] = 0.5;
+            let brought: Vec<f32> = blocks.iter().flat_map(|b| b.0).take(count).collect();
+            let sum = accumulate(&mut blocks, count);
+            assert!((sum - brought.iter().map(|&b| f64::from(b)).sum::<f64>()).abs() < 1e-9);
+            let ends: Vec<f32> = blocks.iter().map(|b| b.0[BLOCK - 1]).collect();
+            let row = Row { blocks: &blocks, ends: &ends };
+            let plain: Vec<f32> = (0..count).map(|e| row.cumulative(e)).collect();
+            assert_eq!(plain[count - 1], 1.0);
+            for _ in 0..200 {
+                let u = rng.next_f32();
+                let e = row.find(u);
+                assert_eq!(e, plain.partition_point(|&c| c <= u));
+                assert!((f64::from(row.probability(e)) - f64::from(brought[e]) / sum).abs() < 1e-6 && brought[e] > 0.0);
+            }
+        }
     }
 }

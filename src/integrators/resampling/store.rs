@@ -24,29 +24,26 @@ const AT_ONCE: u32 = 64;
 pub(in crate::integrators) struct LightStore {
     /// M, with those that ended at once.
     pub paths_traced: u32,
-    paths: Vec<StoredPath>,
     nodes: Vec<Node>,
     /// When finished, in an order that keeps neighbours together.
     vertices: Vec<StoredVertex>,
+    /// The same before that: kept for its memory.
+    unsorted: Vec<StoredVertex>,
     bsdfs: BsdfPool,
     /// Tree over the vertices, weighed by the luminance of f_y/p.
     pub tree: PointTree,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct StoredPath {
-    number: u32,
-    first_node: usize,
-    next_event: f32,
-    light_can_be_hit: bool,
-    origin: Option<Origin>,
-}
-
-/// A vertex, and the sub-path it ends.
+/// A vertex, and what is to be known of the sub-path it ends: all that a connection reads but the densities.
 #[derive(Clone, Copy, Debug)]
 struct StoredVertex {
     vertex: LightVertex,
-    path: u32,
+    /// Number of the sub-path among those of the iteration.
+    number: u32,
+    /// The first of its densities.
+    first_node: u32,
+    next_event: f32,
+    light_can_be_hit: bool,
 }
 
 impl LightVertex {
@@ -104,14 +101,14 @@ impl LightStore {
         (store, stats)
     }
 
-    /// The surface vertices of sub-path `number` of the iteration, written down.
-    pub fn retrace(this: &Bidirectional, iteration: &Iteration, number: u32) -> Vec<VertexRecord> {
+    /// The surface vertices of sub-path `number` of the iteration, written down, and its origin.
+    pub fn retrace(this: &Bidirectional, iteration: &Iteration, number: u32) -> (Vec<VertexRecord>, Option<Origin>) {
         let mut replay = Replay::default();
         let mut tracer = Tracer::new(&*iteration.scene.query);
         let mut sampler = this.light_sampler(iteration, number);
         let mut path = LightPath::default();
         light_path::trace(this, iteration.scene, &mut sampler, &mut tracer, &mut path, None, Some(&mut replay), true);
-        replay.light
+        (replay.light, path.origin)
     }
 
     /// Takes in sub-path `number`.
@@ -120,43 +117,42 @@ impl LightStore {
         if path.vertices.is_empty() {
             return;
         }
-        let stored = self.paths.len() as u32;
-        self.paths.push(StoredPath {
-            number,
-            first_node: self.nodes.len(),
-            next_event: path.next_event,
-            light_can_be_hit: path.light_can_be_hit,
-            origin: path.origin,
-        });
+        let first_node = self.nodes.len() as u32;
         self.nodes.extend_from_slice(path.side.nodes());
         let bsdfs = &mut self.bsdfs;
-        self.vertices.extend(path.vertices.iter().map(|v| {
-            let bsdf = bsdfs.keep_from(&v.bsdf, &path.bsdfs);
-            StoredVertex { vertex: LightVertex { bsdf, ..*v }, path: stored }
+        self.vertices.extend(path.vertices.iter().map(|v| StoredVertex {
+            vertex: LightVertex { bsdf: bsdfs.keep_from(&v.bsdf, &path.bsdfs), ..*v },
+            number,
+            first_node,
+            next_event: path.next_event,
+            light_can_be_hit: path.light_can_be_hit,
         }));
     }
 
     /// Takes in everything of `other`.
     pub fn append(&mut self, other: &LightStore) {
-        let (paths, nodes) = (self.paths.len() as u32, self.nodes.len());
+        let first_node = self.nodes.len() as u32;
         self.paths_traced += other.paths_traced;
-        self.paths.extend(other.paths.iter().map(|path| StoredPath { first_node: path.first_node + nodes, ..*path }));
         self.nodes.extend_from_slice(&other.nodes);
         let moved = self.bsdfs.append(&other.bsdfs);
         self.vertices.extend(other.vertices.iter().map(|v| {
-            let bsdf = v.vertex.bsdf.moved(moved);
-            StoredVertex { vertex: LightVertex { bsdf, ..v.vertex }, path: v.path + paths }
+            let vertex = LightVertex { bsdf: v.vertex.bsdf.moved(moved), ..v.vertex };
+            StoredVertex { vertex, first_node: v.first_node + first_node, ..*v }
         }));
     }
 
     /// Puts the vertices in order, when all are there, and builds the tree over them if a first stage wants it.
     pub fn finish(&mut self, with_tree: bool) {
         let positions: Vec<Vec3> = self.vertices.iter().map(|v| v.vertex.p).collect();
-        self.vertices = morton::order(&positions).iter().map(|&i| self.vertices[i as usize]).collect();
+        let order = morton::order(&positions);
+        // The memory of the last iteration takes the vertices of this one.
+        std::mem::swap(&mut self.vertices, &mut self.unsorted);
+        let unsorted = &self.unsorted;
+        order.par_iter().map(|&i| unsorted[i as usize]).collect_into_vec(&mut self.vertices);
         if !with_tree {
             return;
         }
-        let sorted: Vec<Vec3> = self.vertices.iter().map(|v| v.vertex.p).collect();
+        let sorted: Vec<Vec3> = order.iter().map(|&i| positions[i as usize]).collect();
         self.tree.build(
             &sorted,
             self.vertices.iter().map(|v| {
@@ -169,7 +165,6 @@ impl LightStore {
     /// Forgets everything but its memory.
     pub fn clear(&mut self) {
         self.paths_traced = 0;
-        self.paths.clear();
         self.nodes.clear();
         self.vertices.clear();
         self.bsdfs.clear();
@@ -208,16 +203,15 @@ impl LightStore {
     /// The sub-path that ends in vertex `v`, as a candidate for a connection that counts `scale` times.
     #[inline]
     pub fn candidate(&self, v: usize, scale: f32) -> Candidate<'_> {
-        let StoredVertex { vertex, path } = &self.vertices[v];
-        let path = &self.paths[*path as usize];
+        let StoredVertex { vertex, number, first_node, next_event, light_can_be_hit } = &self.vertices[v];
         Candidate {
             vertex,
             bsdf: self.bsdf(vertex),
-            nodes: &self.nodes[path.first_node..path.first_node + vertex.length()],
-            next_event: path.next_event,
-            light_can_be_hit: path.light_can_be_hit,
-            origin: path.origin,
-            number: Some(path.number),
+            nodes: &self.nodes[*first_node as usize..][..vertex.length()],
+            next_event: *next_event,
+            light_can_be_hit: *light_can_be_hit,
+            origin: None,
+            number: Some(*number),
             scale,
         }
     }

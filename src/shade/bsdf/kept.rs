@@ -63,7 +63,7 @@ impl BsdfPool {
             links: links.len() as u8,
         };
         // Nearly always there is nothing.
-        if !leaves.is_empty() {
+        if let Scattering::Lobes { .. } = scattering {
             self.leaves.extend_from_slice(leaves);
             self.links.extend_from_slice(links);
         }
