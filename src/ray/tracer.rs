@@ -7,6 +7,7 @@
 use super::embree::EmbreeScene;
 use super::{Hit, PACKET, Phases, Ray, RayQuery, SegmentPacket};
 use std::sync::LazyLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
 
 /// What a ray is for.
@@ -71,7 +72,10 @@ impl RayKind {
 
 const KINDS: usize = RayKind::ALL.len();
 /// One query in this many is timed; a prime, so that it does not keep step with the bounces of a path.
-const TIMED_ONE_IN: u32 = 61;
+const TIMED_ONE_IN: u32 = 509;
+
+/// Tracers made so far. Most make few queries: each begins to count elsewhere, so that all of their queries get their turn.
+static TRACERS: AtomicU32 = AtomicU32::new(0);
 
 /// Counters of one kind of ray.
 #[derive(Clone, Copy, Debug, Default)]
@@ -80,8 +84,8 @@ pub struct KindStats {
     pub rays: u64,
     /// Of occlusion rays: those that were blocked.
     pub blocked: u64,
-    /// Queries (a packet is one).
-    calls: u64,
+    /// Packets, if they went in packets.
+    packets: u64,
     timed_calls: u64,
     timed_ns: u64,
 }
@@ -93,7 +97,8 @@ impl KindStats {
             return 0.0;
         }
         let mean = self.timed_ns as f64 / self.timed_calls as f64 - *CLOCK_NS;
-        mean.max(0.0) * self.calls as f64 * 1e-9
+        let calls = if self.packets > 0 { self.packets } else { self.rays };
+        mean.max(0.0) * calls as f64 * 1e-9
     }
 
     #[cold]
@@ -131,7 +136,7 @@ impl RayStats {
         for (a, b) in self.kinds.iter_mut().zip(&o.kinds) {
             a.rays += b.rays;
             a.blocked += b.blocked;
-            a.calls += b.calls;
+            a.packets += b.packets;
             a.timed_calls += b.timed_calls;
             a.timed_ns += b.timed_ns;
         }
@@ -177,21 +182,18 @@ impl<'a> Tracer<'a> {
             #[cfg(any(embree3, embree4))]
             embree: query.as_embree(),
             stats: RayStats::default(),
-            until_timed: TIMED_ONE_IN,
+            until_timed: 1 + TRACERS.fetch_add(1, Ordering::Relaxed).wrapping_mul(97) % TIMED_ONE_IN,
         }
     }
 
-    /// Counts a query of `rays` rays and makes it, on the clock if it is its turn. There is one call only, so that it is inlined once.
+    /// Makes a query, on the clock if it is its turn. There is one call only, so that it is inlined once.
     #[inline(always)]
-    fn timed<T>(&mut self, kind: RayKind, rays: u64, call: impl FnOnce(&Self) -> T) -> T {
+    fn timed<T>(&mut self, kind: RayKind, call: impl FnOnce(&Self) -> T) -> T {
         self.until_timed -= 1;
         let start = if self.until_timed == 0 { self.start_clock() } else { None };
         let out = call(self);
-        let stats = &mut self.stats.kinds[kind as usize];
-        stats.calls += 1;
-        stats.rays += rays;
         if let Some(start) = start {
-            stats.stop_clock(start);
+            self.stats.kinds[kind as usize].stop_clock(start);
         }
         out
     }
@@ -221,15 +223,18 @@ impl<'a> Tracer<'a> {
             self.stats.invalid += 1;
             return None;
         }
-        self.timed(kind, 1, |tracer| tracer.closest_untimed(ray))
+        self.stats.kinds[kind as usize].rays += 1;
+        self.timed(kind, |tracer| tracer.closest_untimed(ray))
     }
 
     /// Bit `i` set: segment `i` is blocked. Segments that are not valid count as blocked.
     #[inline]
     pub fn occluded_packet(&mut self, packet: &SegmentPacket, kind: RayKind) -> u16 {
         debug_assert!(packet.len <= PACKET);
-        let (mask, invalid) = self.timed(kind, packet.len as u64, |tracer| tracer.query.occluded_packet(packet));
+        let (mask, invalid) = self.timed(kind, |tracer| tracer.query.occluded_packet(packet));
         let stats = &mut self.stats.kinds[kind as usize];
+        stats.rays += packet.len as u64;
+        stats.packets += 1;
         stats.blocked += u64::from(mask.count_ones());
         self.stats.invalid += u64::from(invalid);
         mask
