@@ -1,23 +1,69 @@
 #!/bin/sh
-# Every integrator on every scene of this folder, error against time, in one report.
+# Error against time of many integrators on many scenes, in one report.
 #
 #   sh scenes/compare.sh [FOLDER]
 #
-# writes FOLDER/index.html, converge.csv and converge.json (FOLDER is out/compare if not given). References are rendered
-# once and kept. With the defaults this takes hours; less of everything is quicker:
+# writes FOLDER/index.html, converge.csv and converge.json (FOLDER is out/compare if not given). FIGURES says which comparisons of
+# the papers to repeat, by the names below; without it every integrator takes part with its defaults.
 #
-#   SIZE=160x90 TIME=5s SEEDS=2 REFERENCE_TIME=1m SCENES="cornell door" sh scenes/compare.sh out/quick
+#   methods      bdpt, pcbpt, ris, two-stage    Nabata et al. 2020 (weights), Figs. 1, 4, 5, 10; (two stages), Figs. 5, 11
+#   caching      bdpt, ic-bdpt, skeleton        Noel and Biri 2015, Figs. 6 to 9
+#   paths        M = 50 ... 800                 (weights), Figs. 6, 7; (two stages), Figs. 8, 9
+#   samples      N = 1, 2, 4                    (weights), Fig. 9
+#   neighbours   N_c = 0, 1, 3                  (weights), section 6.1.5
+#   weights      what weights know              (weights), Fig. 2; (two stages), Fig. 10
+#   first-stage  M_1 = 10^3 ... 10^5            (two stages), Fig. 6
+#   last-stage   M_2 = 50 ... 800               (two stages), Fig. 7
+#
+# SCENES are names in this folder or scene files; references are rendered once and kept. With the defaults this takes hours; less of
+# everything is quicker:
+#
+#   SIZE=160x90 TIME=5s SEEDS=2 REFERENCE_TIME=1m FIGURES="methods weights" SCENES="cornell door" sh scenes/compare.sh out/quick
 set -eu
 cd "$(dirname "$0")/.."
 
 out=${1:-out/compare}
-scenes=${SCENES:-"cornell door colonnade bedroom classroom house cathedral cafe caustic many-lamps"}
 files=
-for scene in $scenes; do
-    files="$files scenes/$scene/$scene.xml"
+for scene in ${SCENES:-cornell door colonnade bedroom classroom house cathedral cafe caustic many-lamps}; do
+    if [ -f "$scene" ]; then
+        files="$files $scene"
+    else
+        files="$files scenes/$scene/$scene.xml"
+    fi
 done
 
-# Integrators come from the program's own list, each with its defaults; INTEGRATORS names others, with parameters if wanted.
+# The same method named twice would be measured twice.
+methods=
+add() {
+    for method in "$@"; do
+        case " $methods " in
+        *" $method "*) ;;
+        *) methods="$methods $method" ;;
+        esac
+    done
+}
+for figure in ${FIGURES:-}; do
+    case $figure in
+    methods) add bdpt pcbpt ris two-stage ;;
+    caching) add bdpt ic-bdpt skeleton ;;
+    paths) for m in 50 100 200 400 800; do add "ris:paths=$m" "two-stage:second_stage=$m"; done ;;
+    samples) for n in 1 2 4; do add "ris:samples=$n" "two-stage:samples=$n"; done ;;
+    neighbours) for n in 0 1 3; do add "ris:neighbours=$n" "two-stage:neighbours=$n"; done ;;
+    weights)
+        add pcbpt:paths=100 pcbpt:paths=10000 ris:paths=100 ris:paths=10000
+        add two-stage:weights=balance two-stage:weights=ris two-stage:weights=two-stage
+        ;;
+    first-stage) for m in 1000 10000 100000; do add "two-stage:paths=$m"; done ;;
+    last-stage) for m in 50 100 200 400 800; do add "two-stage:second_stage=$m"; done ;;
+    *)
+        echo "compare.sh: no figure is called $figure" >&2
+        exit 2
+        ;;
+    esac
+done
+methods=${INTEGRATORS:-$(echo $methods | tr ' ' ',')}
+
 # shellcheck disable=SC2086 # one word for each scene and option
-exec ${LIGHTSIEVE:-cargo run --release --} converge $files ${INTEGRATORS:+-i "$INTEGRATORS"} ${SIZE:+--size "$SIZE"} \
-    --time "${TIME:-60s}" --seeds "${SEEDS:-3}" --reference-time "${REFERENCE_TIME:-30m}" --report "$out"
+exec ${LIGHTSIEVE:-cargo run --release --} converge $files ${methods:+-i "$methods"} ${SIZE:+--size "$SIZE"} \
+    --time "${TIME:-60s}" --seeds "${SEEDS:-3}" --reference-time "${REFERENCE_TIME:-30m}" \
+    --reference-integrator "${REFERENCE:-two-stage}" --report "$out"

@@ -4,7 +4,8 @@
 //! one slot for each of six directions that a surface may face, and a slot is searched (from the middle of its cell) when it is
 //! first asked for. The answer is thus a function of the cell and the facing alone: the same for any order of questions.
 //!
-//! Points whose surface faces another way count as far: a point on the other side of a thin wall is near, but sees another room.
+//! Points whose surface faces another way count as far, unless told otherwise: a point on the other side of a thin wall is near, but sees
+//! another room.
 
 use crate::math::Vec3;
 use std::ops::Range;
@@ -20,9 +21,35 @@ const NOBODY: u64 = (1 << BITS) - 1;
 /// Slots hold this bit when they have been searched.
 const KNOWN: u64 = 1 << 63;
 
+/// Which points are near.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Metric {
+    /// Those whose surface faces about the same way, by their distance.
+    Facing,
+    /// All, by their distance.
+    Plain,
+}
+
+impl Metric {
+    /// The kind of surface that `n` belongs to; points of different kinds have different neighbours.
+    #[inline]
+    pub fn kind(self, n: Vec3) -> usize {
+        match self {
+            Metric::Facing => facing(n),
+            Metric::Plain => 0,
+        }
+    }
+
+    /// Whether a point with the normal `n` is found by those of a kind.
+    fn finds(self, n: Vec3, kind: usize) -> bool {
+        self == Metric::Plain || faces(n, kind)
+    }
+}
+
 /// A fixed set of oriented points.
 #[derive(Debug)]
 pub struct NearestPoints {
+    metric: Metric,
     points: Vec<Vec3>,
     normals: Vec<Vec3>,
     /// For each facing: a left-balanced kd-tree of the points that face that way, as a list of numbers.
@@ -36,7 +63,7 @@ pub struct NearestPoints {
 }
 
 /// Which of ±x, ±y, ±z `n` is nearest to.
-pub fn facing(n: Vec3) -> usize {
+fn facing(n: Vec3) -> usize {
     let a = n.abs();
     let axis = if a.x >= a.y && a.x >= a.z {
         0
@@ -109,10 +136,10 @@ fn search(points: &[Vec3], tree: &[u32], axis: usize, p: Vec3, best: &mut Best) 
 impl NearestPoints {
     /// An index of `points` with the unit normals of their surfaces' sides. At most 2²¹ − 1 points are indexed; later ones are
     /// never found.
-    pub fn new(points: Vec<Vec3>, normals: Vec<Vec3>) -> NearestPoints {
+    pub fn new(points: Vec<Vec3>, normals: Vec<Vec3>, metric: Metric) -> NearestPoints {
         let most = points.len().min(normals.len()).min(NOBODY as usize);
         let trees = std::array::from_fn(|f| {
-            let mut tree: Vec<u32> = (0..most as u32).filter(|&i| faces(normals[i as usize], f)).collect();
+            let mut tree: Vec<u32> = (0..most as u32).filter(|&i| metric.finds(normals[i as usize], f)).collect();
             build_tree(&points, &mut tree, 0);
             tree
         });
@@ -122,7 +149,7 @@ impl NearestPoints {
         let per_cell = CELLS as f32 / size.max_element().max(f32::MIN_POSITIVE);
         let cells = (size * per_cell).to_array().map(|s| (s.ceil() as usize).clamp(1, CELLS));
         let slots = (0..cells.iter().product::<usize>() * 6).map(|_| AtomicU64::new(0)).collect();
-        NearestPoints { points, normals, trees, lo, per_cell, cells, slots, groups: None }
+        NearestPoints { metric, points, normals, trees, lo, per_cell, cells, slots, groups: None }
     }
 
     /// From now on only points of the nearest one's group are found; `groups` are ranges that have every point in one of them.
@@ -158,7 +185,7 @@ impl NearestPoints {
         let cell = ((p - self.lo) * self.per_cell).to_array();
         // Negative numbers and NaN become zero.
         let cell: [usize; 3] = std::array::from_fn(|i| (cell[i] as usize).min(self.cells[i] - 1));
-        let facing = facing(n);
+        let facing = self.metric.kind(n);
         let slot = &self.slots[((cell[2] * self.cells[1] + cell[1]) * self.cells[0] + cell[0]) * 6 + facing];
         let mut found = slot.load(Ordering::Relaxed);
         if found == 0 {
@@ -176,7 +203,7 @@ impl NearestPoints {
         search(&self.points, &self.trees[facing], 0, middle, &mut best);
         if let Some(group) = self.groups.as_ref().and_then(|groups| groups.get(best.number[0] as usize)) {
             best = Best { distance2: [f32::INFINITY; MOST], number: [NOBODY; MOST] };
-            for i in group.clone().filter(|&i| faces(self.normals[i], facing)) {
+            for i in group.clone().filter(|&i| self.metric.finds(self.normals[i], facing)) {
                 best.offer(middle.distance_squared(self.points[i]), i as u32);
             }
         }
@@ -205,20 +232,23 @@ mod tests {
                 (Vec3::new(x, y, z) - 0.5).normalize_or(Vec3::Z)
             })
             .collect();
-        let index = NearestPoints::new(points.clone(), normals.clone());
+        let index = NearestPoints::new(points.clone(), normals.clone(), Metric::Facing);
+        let plain = NearestPoints::new(points.clone(), normals.clone(), Metric::Plain);
         let groups: Vec<Range<usize>> = (0..300).map(|g| g * 10..g * 10 + 10).collect();
-        let grouped = NearestPoints::new(points.clone(), normals.clone()).within_groups(&groups);
+        let grouped = NearestPoints::new(points.clone(), normals.clone(), Metric::Facing).within_groups(&groups);
         for _ in 0..500 {
             let [x, y, z, w] = rng.next_4();
             let (p, f) = (Vec3::new(x * 6.0 - 0.5, y * 4.0 - 0.5, z * 2.0 - 0.5), (w * 6.0) as usize);
             let cell = ((p - index.lo) * index.per_cell).to_array();
             let cell: [usize; 3] = std::array::from_fn(|i| (cell[i] as usize).min(index.cells[i] - 1));
             let middle = index.lo + Vec3::from(cell.map(|c| c as f32 + 0.5)) / index.per_cell;
-            let mut all: Vec<usize> = (0..3000).filter(|&i| normals[i].dot(direction(f)) > 0.2).collect();
-            all.sort_by(|&a, &b| {
+            let mut by_distance: Vec<usize> = (0..3000).collect();
+            by_distance.sort_by(|&a, &b| {
                 let d = |i: usize| middle.distance_squared(points[i]);
                 d(a).total_cmp(&d(b)).then(a.cmp(&b))
             });
+            assert_eq!(plain.find(p, direction(f)).collect::<Vec<_>>(), by_distance[..MOST]);
+            let all: Vec<usize> = by_distance.into_iter().filter(|&i| normals[i].dot(direction(f)) > 0.2).collect();
             let of_group: Vec<usize> = all.iter().copied().filter(|i| i / 10 == all[0] / 10).take(MOST).collect();
             for _ in 0..2 {
                 assert_eq!(index.find(p, direction(f)).collect::<Vec<_>>(), all[..MOST]);
@@ -229,9 +259,9 @@ mod tests {
 
     #[test]
     fn few_points_or_none() {
-        let none = NearestPoints::new(vec![], vec![]);
+        let none = NearestPoints::new(vec![], vec![], Metric::Facing);
         assert_eq!(none.find(Vec3::ONE, Vec3::X).count(), 0);
-        let one = NearestPoints::new(vec![Vec3::ONE], vec![Vec3::Y]);
+        let one = NearestPoints::new(vec![Vec3::ONE], vec![Vec3::Y], Metric::Facing);
         assert_eq!(one.find(Vec3::splat(f32::NAN), Vec3::Y).collect::<Vec<_>>(), [0]);
         assert_eq!(one.find(Vec3::splat(1e9), Vec3::NEG_Y).count(), 0);
     }

@@ -12,6 +12,7 @@ use super::resampling::{self, Scheme, Settings, Weights};
 use super::{Integrator, IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::{Heuristic, Techniques};
 use crate::prepared::Features;
+use crate::spatial::nearest::Metric;
 
 const PATHS: ParamSpec = ParamSpec {
     about: "N, light sub-paths per iteration from which eye vertices draw; all others serve the light image only",
@@ -63,6 +64,8 @@ fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> S
         cache_fraction: records as f64 * 1e-5,
         epsilon: 1.0,
         doubt: 0.0,
+        trust: false,
+        metric: Metric::Facing,
         weights: Weights::Balance,
     }
 }

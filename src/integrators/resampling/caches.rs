@@ -4,6 +4,7 @@
 //! and face the same way form groups of up to sixteen, which share packets of shadow rays and, where there are two stages, the
 //! candidates of the second. Each keeps running means of what there is to find at it: its normalisations Q.
 
+use super::Settings;
 use crate::math::sampler::PathSampler;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::mis::{Targets, There};
@@ -13,7 +14,7 @@ use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, Ray, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use crate::spatial::NearestPoints;
-use crate::spatial::nearest::{MOST, facing};
+use crate::spatial::nearest::MOST;
 use crate::spatial::point_tree::Viewpoint;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -62,6 +63,7 @@ pub(in crate::integrators) struct Caches {
     pub companions: Vec<u16>,
     /// What is asked of each point at every vertex, in one piece.
     known: Vec<Known>,
+    trusted: bool,
     /// Sum over iterations of what each point found, and their number.
     sums: Vec<Found>,
     iterations: u64,
@@ -122,25 +124,23 @@ impl Caches {
         groups.iter().flat_map(|group| group.clone().map(move |own| nearest(group, own))).collect()
     }
 
-    /// The vertices of `fraction` times as many eye sub-paths as the full picture has pixels. With `by_group`, all neighbours of a
-    /// place are of one group.
-    pub fn new(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits, by_group: bool) -> (Caches, RayStats) {
-        let (mut all, stats) = place(scene, seed, fraction, limits);
+    /// The vertices of eye sub-paths, as many as `settings` say. If there are two stages, all neighbours of a place are of one group.
+    pub fn new(scene: &PreparedScene, seed: u64, settings: &Settings, limits: &Limits) -> (Caches, RayStats) {
+        let (mut all, stats) = place(scene, seed, settings.cache_fraction, limits);
+        let metric = settings.metric;
         // Stable sorts and selections on equal input: the same for any number of threads.
-        all.sort_by_key(|c| facing(c.side));
+        all.sort_by_key(|c| metric.kind(c.side));
         let mut groups = vec![];
         let mut first = 0;
         while first < all.len() {
-            let own = facing(all[first].side);
-            let count = all[first..].iter().take_while(|c| facing(c.side) == own).count();
+            let own = metric.kind(all[first].side);
+            let count = all[first..].iter().take_while(|c| metric.kind(c.side) == own).count();
             group(&mut all[first..first + count], first, &mut groups);
             first += count;
         }
         let (points, sides) = (all.iter().map(|c| c.p).collect(), all.iter().map(|c| c.side).collect());
-        let index = match by_group {
-            true => NearestPoints::new(points, sides).within_groups(&groups),
-            false => NearestPoints::new(points, sides),
-        };
+        let index = NearestPoints::new(points, sides, metric);
+        let index = if settings.second_stage.is_some() { index.within_groups(&groups) } else { index };
         let ends = all.iter().map(|c| SegmentEnd::Surface { p: c.p, error: c.error, ng: c.ng }).collect();
         let companions = Self::companions(&all, &groups);
         let unlike_at = groups.iter().flat_map(|group| {
@@ -151,7 +151,8 @@ impl Caches {
         });
         let know = |(c, unlike_at): (&Cache, f32)| Known { p: c.p, unlike_at, side: c.side, means: [0.0; 3] };
         let known = all.iter().zip(unlike_at).map(know).collect();
-        (Caches { index, ends, groups, companions, known, sums: vec![[0.0; 3]; all.len()], iterations: 0 }, stats)
+        let sums = vec![[0.0; 3]; all.len()];
+        (Caches { index, ends, groups, companions, known, trusted: settings.trust, sums, iterations: 0 }, stats)
     }
 
     /// A cache point's end of a shadow ray.
@@ -190,6 +191,9 @@ impl Caches {
             return There::default();
         }
         let all = Targets { scattered: sum[0] / count, unscattered: sum[1] / count };
+        if self.trusted {
+            return There { all, ..There::default() };
+        }
         let missed = if sum[0] > 0.0 { sum[2] / sum[0] } else { 0.0 };
         There { all, missed: missed.max(unlike), blur2 }
     }

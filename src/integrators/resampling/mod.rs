@@ -32,6 +32,7 @@ use super::bdpt::sizing;
 use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, TECHNIQUES};
 use super::{IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::Heuristic;
+use crate::spatial::nearest::Metric;
 pub(in crate::integrators) use resampler::Resampler;
 
 pub(in crate::integrators) const PATHS: ParamSpec = ParamSpec {
@@ -80,6 +81,16 @@ const DOUBT: ParamSpec = ParamSpec {
     about: "smallest share of light, in millionths, of which weights assume that the cache points around do not know it",
     default: ParamDefault::Int(20_000, 0, 1_000_000),
 };
+const TRUST: ParamSpec = ParamSpec {
+    name: "trust",
+    about: "what weights assume of cache points: learned: that they know as much of a place's light as they turned out to know of each other's; full: all of it, but for `doubt`",
+    default: ParamDefault::Choice("learned", &["learned", "full"]),
+};
+const METRIC: ParamSpec = ParamSpec {
+    name: "metric",
+    about: "the nearest cache points of a place are those on surfaces that face about the same way, or those of any surface (plain)",
+    default: ParamDefault::Choice("facing", &["facing", "plain"]),
+};
 const SKIP: ParamSpec = sizing::parameter("auto");
 const fn weights(default: &'static str, choices: &'static [&'static str]) -> ParamSpec {
     ParamSpec {
@@ -90,7 +101,7 @@ const fn weights(default: &'static str, choices: &'static [&'static str]) -> Par
 }
 
 /// The parameters of methods with one stage; they differ in the weights they take by default.
-const fn one_stage(default_weights: &'static str) -> [ParamSpec; 13] {
+const fn one_stage(default_weights: &'static str) -> [ParamSpec; 15] {
     let weights = weights(default_weights, &["balance", "ris"]);
     [
         MAX_DEPTH,
@@ -102,16 +113,18 @@ const fn one_stage(default_weights: &'static str) -> [ParamSpec; 13] {
         SAMPLES,
         NEIGHBOURS,
         CACHES,
+        METRIC,
         EPSILON,
         DOUBT,
+        TRUST,
         weights,
         SKIP,
     ]
 }
 
-const PCBPT_PARAMS: [ParamSpec; 13] = one_stage("balance");
-const RIS_PARAMS: [ParamSpec; 13] = one_stage("ris");
-const TWO_STAGE_PARAMS: [ParamSpec; 14] = [
+const PCBPT_PARAMS: [ParamSpec; 15] = one_stage("balance");
+const RIS_PARAMS: [ParamSpec; 15] = one_stage("ris");
+const TWO_STAGE_PARAMS: [ParamSpec; 16] = [
     MAX_DEPTH,
     RR_DEPTH,
     KEEP,
@@ -122,8 +135,10 @@ const TWO_STAGE_PARAMS: [ParamSpec; 14] = [
     SAMPLES,
     NEIGHBOURS,
     GROUPED_CACHES,
+    METRIC,
     EPSILON,
     DOUBT,
+    TRUST,
     weights("two-stage", &["balance", "ris", "two-stage"]),
     SKIP,
 ];
@@ -138,6 +153,8 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
         cache_fraction: params.int("caches") as f64 * 1e-5,
         epsilon: params.int("epsilon") as f32 * 1e-6,
         doubt: params.int("doubt") as f32 * 1e-6,
+        trust: params.choice("trust") == "full",
+        metric: if params.choice("metric") == "plain" { Metric::Plain } else { Metric::Facing },
         weights: match params.choice("weights") {
             "balance" => Weights::Balance,
             "ris" => Weights::OneStage,
@@ -239,6 +256,10 @@ pub(in crate::integrators) struct Settings {
     pub epsilon: f32,
     /// See [`Resampled::doubt`](crate::mis::Resampled).
     pub doubt: f32,
+    /// Weights assume that a place's light is what its cache points know.
+    pub trust: bool,
+    /// Which cache points are near.
+    pub metric: Metric,
     /// What weights know.
     pub weights: Weights,
 }

@@ -56,8 +56,7 @@ impl Bidirectional {
             }
             return;
         }
-        let (mut caches, s) =
-            Caches::new(scene, iteration.seed, cache_fraction, &self.weigher.eye_limits, second_stage.is_some());
+        let (mut caches, s) = Caches::new(scene, iteration.seed, &resampler.settings, &self.weigher.eye_limits);
         stats.merge(&s);
         let first = Iteration { index: 0, ..*iteration };
         let (mut seen, mut pmfs) = ([0, 0], Pmfs::default());

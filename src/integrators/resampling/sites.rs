@@ -10,7 +10,7 @@ use crate::path::Limits;
 use crate::prepared::PreparedScene;
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, RayStats};
-use crate::spatial::nearest::MOST;
+use crate::spatial::nearest::{MOST, Metric};
 use crate::spatial::{NearestPoints, Skeleton, morton};
 use std::ops::Range;
 
@@ -44,7 +44,7 @@ impl Sites {
         let positions: Vec<Vec3> = all.iter().map(|c| c.p).collect();
         all = morton::order(&positions).into_iter().map(|i| all[i as usize]).collect();
         let normals: Vec<Vec3> = all.iter().map(|c| c.side).collect();
-        let index = NearestPoints::new(all.iter().map(|c| c.p).collect(), normals.clone());
+        let index = NearestPoints::new(all.iter().map(|c| c.p).collect(), normals.clone(), Metric::Facing);
         let ends = all.iter().map(|c| SegmentEnd::Surface { p: c.p, error: c.error, ng: c.ng }).collect();
         (Sites { ends, normals: Some(normals), finder: Finder::Nearest(Box::new(index)) }, stats)
     }
