@@ -90,7 +90,7 @@ impl<'a> Stage<'a> {
             report::print(&diagnostics);
         }
         let scene = prepared.map_err(Failure::input)?;
-        let name = path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
+        let name = scene_name(path);
         let mut reasons = vec![];
         contenders.retain(|c| match (c.spec.refuses)(scene.features) {
             Some(reason) => {
@@ -199,4 +199,27 @@ pub(crate) fn write_text(folder: &Path, name: &str, text: &str) -> Result<PathBu
 
 pub(crate) fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
     serde_json::to_string_pretty(value).map_err(Failure::io)
+}
+
+/// What a scene is called: its file's name, or its folder's where all files are called `scene`.
+fn scene_name(path: &Path) -> String {
+    let text = |part: Option<&std::ffi::OsStr>| part.map(|s| s.to_string_lossy().into_owned());
+    match text(path.file_stem()) {
+        Some(name) if name != "scene" => name,
+        stem => text(path.parent().and_then(Path::file_name)).or(stem).unwrap_or_else(|| "scene".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_have_names() {
+        for (path, name) in
+            [("a/door.xml", "door"), ("rooms/hall/scene.xml", "hall"), ("scene.xml", "scene"), ("/scene.xml", "scene")]
+        {
+            assert_eq!(scene_name(Path::new(path)), name);
+        }
+    }
 }

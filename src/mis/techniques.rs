@@ -16,8 +16,6 @@ pub struct Techniques {
     light_paths: f32,
     /// Samples of each technique with s ≥ 2 and t ≥ 2.
     connections: f32,
-    /// Factor of `connections` for each s.
-    by_length: Option<Box<[f32; SIDES]>>,
 }
 
 /// A list of techniques that cannot be understood.
@@ -30,12 +28,12 @@ pub struct TechniquesError(String);
 impl Techniques {
     /// All of them, with one light sub-path per iteration.
     pub fn all() -> Techniques {
-        Techniques { on: Box::new([!0; SIDES]), light_paths: 1.0, connections: 1.0, by_length: None }
+        Techniques { on: Box::new([!0; SIDES]), light_paths: 1.0, connections: 1.0 }
     }
 
     /// None of them, with one light sub-path per iteration.
     pub fn none() -> Techniques {
-        Techniques { on: Box::new([0; SIDES]), light_paths: 1.0, connections: 1.0, by_length: None }
+        Techniques { on: Box::new([0; SIDES]), light_paths: 1.0, connections: 1.0 }
     }
 
     /// Sets the number of light sub-paths per iteration.
@@ -46,11 +44,6 @@ impl Techniques {
     /// Sets the number of samples that an eye vertex takes of each connection with s ≥ 2.
     pub fn set_connections(&mut self, connections: f32) {
         self.connections = connections;
-    }
-
-    /// Sets a factor of that number for each number of light vertices.
-    pub fn set_lengths(&mut self, factor: impl Fn(usize) -> f32) {
-        self.by_length = Some(Box::new(std::array::from_fn(factor)));
     }
 
     /// Switches the techniques with these numbers of vertices on or off.
@@ -99,7 +92,7 @@ impl Techniques {
             _ if bit == 0 => 0.0,
             0 => 0.0,
             1 => self.light_paths,
-            _ if s >= 2 => self.connections * self.by_length.as_ref().map_or(1.0, |factors| factors[s.min(SIDES - 1)]),
+            _ if s >= 2 => self.connections,
             _ => 1.0,
         }
     }

@@ -79,8 +79,6 @@ impl Bidirectional {
         let Some(resampler) = &mut self.resampler else { return };
         // A length that was not met is not impossible.
         resampler.lengths = counts.iter().map(|&n| (n as f32).max(0.5) / paths as f32).collect();
-        let resampler = &*resampler;
-        self.weigher.techniques.set_lengths(|s| resampler.share_of_length(s));
     }
 
     /// Gets the candidates of an iteration ready. All its light sub-paths are traced, and what the lens sees of them is brought back:

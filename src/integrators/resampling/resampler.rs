@@ -121,7 +121,8 @@ impl Resampler {
             if length.is_some_and(|s| !possible(s)) {
                 continue;
             }
-            // Long sub-paths are rare and dim: no more of them are connected to than a pixel's own sub-path would have.
+            // Long sub-paths are rare and dim: no more of them are connected to than a pixel's own sub-path would have. A sub-path is then
+            // as likely to be met as by the pixel's own: in weights, such connections count as one.
             let effort = effort * length.map_or(1.0, |s| self.share_of_length(s));
             for _ in 0..self.settings.samples {
                 let u = rng.next_4();

@@ -3,6 +3,9 @@
 use super::Table;
 use std::fmt::Write;
 
+/// Cells with more bytes than this are text, which is broken into lines.
+const LONG: usize = 40;
+
 /// A page that is being written.
 #[derive(Clone, Debug)]
 pub struct Page {
@@ -52,7 +55,8 @@ impl Page {
         let row = |out: &mut String, tag: &str, cells: &[String]| {
             out.push_str("<tr>");
             for cell in cells {
-                let _ = write!(out, "<{tag}>{}</{tag}>", escape(cell));
+                let class = if cell.len() > LONG { " class=\"long\"" } else { "" };
+                let _ = write!(out, "<{tag}{class}>{}</{tag}>", escape(cell));
             }
             out.push_str("</tr>\n");
         };

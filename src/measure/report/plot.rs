@@ -27,6 +27,13 @@ pub struct Plot {
 
 /// Okabe & Ito's colours, which most colour-blind people can tell apart.
 const COLOURS: [&str; 8] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c6d31"];
+/// Where they begin anew, lines are broken in another way.
+const DASHES: [&str; 3] = ["none", "7 4", "2 3"];
+
+/// Colour and dashes of line `i`.
+fn stroke(i: usize) -> (&'static str, &'static str) {
+    (COLOURS[i % COLOURS.len()], DASHES[i / COLOURS.len() % DASHES.len()])
+}
 
 const SIZE: [f64; 2] = [560.0, 380.0];
 /// Left, top, right, bottom.
@@ -134,13 +141,13 @@ impl Plot {
             escape(&self.axes[1]),
         );
         for (i, line) in self.lines.iter().enumerate() {
-            curve(&mut out, line, COLOURS[i % COLOURS.len()], &x, &y);
+            let (colour, dashes) = stroke(i);
+            curve(&mut out, line, (colour, dashes), &x, &y);
             let at = bottom + LEGEND_LINE * i as f64;
             let _ = write!(
                 out,
-                "<path d=\"M{left} {:.1}h22\" stroke=\"{}\" stroke-width=\"2.5\"/><text x=\"{}\" y=\"{:.1}\">{}</text>",
+                "<path d=\"M{left} {:.1}h22\" stroke=\"{colour}\" stroke-dasharray=\"{dashes}\" stroke-width=\"2.5\"/><text x=\"{}\" y=\"{:.1}\">{}</text>",
                 at - 4.0,
-                COLOURS[i % COLOURS.len()],
                 left + 28.0,
                 at,
                 escape(&line.name)
@@ -165,7 +172,7 @@ impl Plot {
     }
 }
 
-fn curve(out: &mut String, line: &Line, colour: &str, x: &Axis, y: &Axis) {
+fn curve(out: &mut String, line: &Line, (colour, dashes): (&str, &str), x: &Axis, y: &Axis) {
     let place = |p: &[f64; 4], v: usize| format!("{:.1} {:.1}", x.at(p[0]), y.at(p[v]));
     let points: Vec<&[f64; 4]> = line.points.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
     if points.is_empty() {
@@ -177,7 +184,7 @@ fn curve(out: &mut String, line: &Line, colour: &str, x: &Axis, y: &Axis) {
     let _ = write!(
         out,
         "<path d=\"M{}L{}Z\" fill=\"{colour}\" fill-opacity=\"0.15\"/>\
-         <path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>",
+         <path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-dasharray=\"{dashes}\" stroke-width=\"2\"/>",
         upper.join("L"),
         lower.join("L"),
         middle.join("L")

@@ -1,6 +1,7 @@
 "use strict";
-// Pictures of one group share zoom and place, so that flipping compares the same pixels. Keys, while a viewer has the focus:
-// 1 … 9 and 0 flip, e shows errors, g shows all side by side, + and - change exposure, r resets.
+// Pictures of one group share zoom and place, so that flipping compares the same pixels. Keys: 1 … 9 and 0 flip, e shows errors, g
+// shows all side by side, + and - change exposure, r resets. They go to the viewer that has the focus, or else to the one under
+// the pointer, or else to the one that most of the window shows.
 (() => {
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const make = (parent, tag, text, kind) => {
@@ -71,7 +72,6 @@
       make(bar, "button", "r reset").addEventListener("click", () => this.set(this.initial));
       this.stage = make(this.figure, "div", undefined, "stage");
       this.status = make(this.figure, "div", "", "status");
-      this.figure.addEventListener("keydown", (event) => this.key(event));
     }
 
     key(event) {
@@ -221,5 +221,18 @@
     }
   }
 
-  for (const figure of document.querySelectorAll("figure.viewer")) new Viewer(figure);
+  const viewers = Array.from(document.querySelectorAll("figure.viewer"), (figure) => new Viewer(figure));
+  // Height of the part of a viewer that can be seen.
+  const seen = (viewer) => {
+    const { top, bottom } = viewer.figure.getBoundingClientRect();
+    return Math.min(bottom, window.innerHeight) - Math.max(top, 0);
+  };
+  document.addEventListener("keydown", (event) => {
+    const shown = viewers.filter((v) => seen(v) > 0);
+    const chosen =
+      shown.find((v) => v.figure.contains(document.activeElement)) ||
+      shown.find((v) => v.figure.matches(":hover")) ||
+      shown.reduce((best, v) => (best && seen(best) >= seen(v) ? best : v), undefined);
+    if (chosen) chosen.key(event);
+  });
 })();
