@@ -45,7 +45,7 @@ const RR_DEPTH: ParamSpec = ParamSpec { default: ParamDefault::Int(1, 1, 1_000_0
 const KEEP: ParamSpec = ParamSpec {
     name: "keep",
     about: "percent of an eye sub-path's survival of Russian roulette on matt surfaces, where connections find all light: lower, more of them end early",
-    default: ParamDefault::Int(30, 1, 100),
+    default: ParamDefault::Int(60, 1, 100),
 };
 const FIRST_STAGE: ParamSpec = ParamSpec {
     name: "paths",
