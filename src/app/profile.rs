@@ -82,6 +82,9 @@ fn tables(p: &Profile) -> Vec<Table> {
     for (name, seconds) in &p.phases {
         phases.row([(*name).to_owned(), format!("{seconds:.3}"), percent(seconds / p.wall_s)]);
     }
+    for (name, seconds) in &p.work {
+        phases.row([format!("  of these, {name} (sampled)"), format!("{seconds:.3}"), percent(seconds / p.wall_s)]);
+    }
     let rest = p.wall_s - p.phases.values().sum::<f64>();
     phases.row(["everything else".into(), format!("{rest:.3}"), percent(rest / p.wall_s)]);
 

@@ -7,7 +7,7 @@ use super::{Contender, LoadWatch, Machine};
 use crate::film::Film;
 use crate::integrators::{Integrator, Iteration};
 use crate::prepared::PreparedScene;
-use crate::ray::{Backend, QueryError, RayKind, RayStats};
+use crate::ray::{Backend, QueryError, RayKind, RayStats, Work};
 use crate::render::stats::Clock;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -61,6 +61,9 @@ pub struct Profile {
     pub cpu_s: f64,
     /// Wall seconds by phase, as far as the integrator tells phases apart.
     pub phases: BTreeMap<&'static str, f64>,
+    /// Wall seconds of work inside of phases (sampled clock, processor seconds over threads; ray queries in between included).
+    /// Connections include their weights.
+    pub work: BTreeMap<&'static str, f64>,
     /// Rays by kind.
     pub rays: BTreeMap<&'static str, KindRow>,
     /// Millions of rays per wall second.
@@ -142,6 +145,11 @@ pub fn profile(scene: &mut PreparedScene, task: &Task) -> Result<(Profile, Film,
         iterations: film.iterations,
         wall_s: wall,
         phases: stats.phases.iter().collect(),
+        work: Work::ALL
+            .into_iter()
+            .filter(|&w| stats.work[w as usize].calls > 0)
+            .map(|w| (w.name(), stats.work[w as usize].seconds() / task.threads.max(1) as f64))
+            .collect(),
         rays: RayKind::ALL.into_iter().filter_map(row).collect(),
         mrays_per_s: rays as f64 / wall / 1e6,
         cpu_s: cpu * 1e-9,

@@ -20,7 +20,7 @@ pub mod tracer;
 
 pub use geometry::{Geometry, Instance, MeshBuffers, VertexBuffer};
 pub use phases::Phases;
-pub use tracer::{RayKind, RayStats, Tracer};
+pub use tracer::{RayKind, RayStats, Tracer, Work};
 
 use crate::math::Vec3;
 use glam::Vec3A;

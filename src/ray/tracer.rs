@@ -86,37 +86,93 @@ pub struct KindStats {
     pub blocked: u64,
     /// Packets, if they went in packets.
     packets: u64,
-    timed_calls: u64,
-    timed_ns: u64,
+    timed: Timed,
 }
 
 impl KindStats {
     /// Estimated seconds inside the backend.
     pub fn seconds(&self) -> f64 {
-        if self.timed_calls == 0 {
-            return 0.0;
-        }
-        let mean = self.timed_ns as f64 / self.timed_calls as f64 - *CLOCK_NS;
-        let calls = if self.packets > 0 { self.packets } else { self.rays };
-        mean.max(0.0) * calls as f64 * 1e-9
+        self.timed.seconds_of(if self.packets > 0 { self.packets } else { self.rays })
     }
+}
 
+/// Calls on the clock.
+#[derive(Clone, Copy, Debug, Default)]
+struct Timed {
+    calls: u64,
+    ns: u64,
+}
+
+/// What takes longer, in nanoseconds, was interrupted by another program and says nothing.
+const INTERRUPTED: u64 = 100_000;
+
+impl Timed {
     #[cold]
     fn stop_clock(&mut self, start: Instant) {
-        self.timed_ns += start.elapsed().as_nanos() as u64;
-        self.timed_calls += 1;
+        let ns = start.elapsed().as_nanos() as u64;
+        if ns < INTERRUPTED {
+            self.ns += ns;
+            self.calls += 1;
+        }
+    }
+
+    /// Estimated seconds of so many calls like these.
+    fn seconds_of(&self, calls: u64) -> f64 {
+        if self.calls == 0 {
+            return 0.0;
+        }
+        (self.ns as f64 / self.calls as f64 - *CLOCK_NS).max(0.0) * calls as f64 * 1e-9
+    }
+
+    fn merge(&mut self, other: Timed) {
+        self.calls += other.calls;
+        self.ns += other.ns;
+    }
+}
+
+/// Work that is too fine-grained and too interwoven for a phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(usize)]
+pub enum Work {
+    /// Eye vertices draw light sub-paths and are connected to them, weights included.
+    Connections,
+    /// Weights of all techniques.
+    Weights,
+}
+
+impl Work {
+    /// Every kind, in the order of their numbers.
+    pub const ALL: [Work; 2] = [Work::Connections, Work::Weights];
+
+    /// Name in statistics.
+    pub fn name(self) -> &'static str {
+        match self {
+            Work::Connections => "connections",
+            Work::Weights => "weights",
+        }
+    }
+}
+
+/// How often some work was done, and some of it on the clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WorkStats {
+    /// Times.
+    pub calls: u64,
+    timed: Timed,
+}
+
+impl WorkStats {
+    /// Estimated seconds, ray queries in between included, summed over threads.
+    pub fn seconds(&self) -> f64 {
+        self.timed.seconds_of(self.calls)
     }
 }
 
 /// Mean nanoseconds that two clock reads add to what lies between them.
 static CLOCK_NS: LazyLock<f64> = LazyLock::new(|| {
-    let mut total = 0u64;
-    let n = 2000;
-    for _ in 0..n {
-        let start = Instant::now();
-        total += start.elapsed().as_nanos() as u64;
-    }
-    total as f64 / f64::from(n)
+    let mut timed = Timed::default();
+    (0..2000).for_each(|_| timed.stop_clock(Instant::now()));
+    timed.ns as f64 / timed.calls.max(1) as f64
 });
 
 /// Counters of all kinds.
@@ -124,6 +180,8 @@ static CLOCK_NS: LazyLock<f64> = LazyLock::new(|| {
 pub struct RayStats {
     /// By kind.
     pub kinds: [KindStats; KINDS],
+    /// By kind of work.
+    pub work: [WorkStats; Work::ALL.len()],
     /// Rays with a component that is not finite; they were not traced.
     pub invalid: u64,
     /// Wall seconds by phase.
@@ -137,8 +195,11 @@ impl RayStats {
             a.rays += b.rays;
             a.blocked += b.blocked;
             a.packets += b.packets;
-            a.timed_calls += b.timed_calls;
-            a.timed_ns += b.timed_ns;
+            a.timed.merge(b.timed);
+        }
+        for (a, b) in self.work.iter_mut().zip(&o.work) {
+            a.calls += b.calls;
+            a.timed.merge(b.timed);
         }
         self.invalid += o.invalid;
         self.phases.merge(&o.phases);
@@ -171,18 +232,21 @@ pub struct Tracer<'a> {
     /// Counters so far.
     pub stats: RayStats,
     until_timed: u32,
+    until_timed_work: u32,
 }
 
 impl<'a> Tracer<'a> {
     /// A tracer with empty counters.
     pub fn new(query: &'a dyn RayQuery) -> Tracer<'a> {
         LazyLock::force(&CLOCK_NS);
+        let first = 1 + TRACERS.fetch_add(1, Ordering::Relaxed).wrapping_mul(97) % TIMED_ONE_IN;
         Tracer {
             query,
             #[cfg(any(embree3, embree4))]
             embree: query.as_embree(),
             stats: RayStats::default(),
-            until_timed: 1 + TRACERS.fetch_add(1, Ordering::Relaxed).wrapping_mul(97) % TIMED_ONE_IN,
+            until_timed: first,
+            until_timed_work: first,
         }
     }
 
@@ -193,9 +257,29 @@ impl<'a> Tracer<'a> {
         let start = if self.until_timed == 0 { self.start_clock() } else { None };
         let out = call(self);
         if let Some(start) = start {
-            self.stats.kinds[kind as usize].stop_clock(start);
+            self.stats.kinds[kind as usize].timed.stop_clock(start);
         }
         out
+    }
+
+    /// Counts a piece of work that begins; what is returned goes to [`Tracer::end`].
+    #[inline]
+    pub fn begin(&mut self, work: Work) -> Option<Instant> {
+        self.stats.work[work as usize].calls += 1;
+        self.until_timed_work -= 1;
+        if self.until_timed_work > 0 {
+            return None;
+        }
+        self.until_timed_work = TIMED_ONE_IN;
+        Some(Instant::now())
+    }
+
+    /// The piece of work is done.
+    #[inline]
+    pub fn end(&mut self, work: Work, started: Option<Instant>) {
+        if let Some(start) = started {
+            self.stats.work[work as usize].timed.stop_clock(start);
+        }
     }
 
     #[cold]

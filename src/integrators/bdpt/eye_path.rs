@@ -12,8 +12,8 @@ use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::{Joint, Node, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment};
 use crate::prepared::PreparedScene;
-use crate::ray::Tracer;
 use crate::ray::offset::{SegmentEnd, segment};
+use crate::ray::{Tracer, Work};
 use crate::shade::{BsdfRef, BsdfSample, SurfacePoint, Transport};
 
 /// Where contributions of an eye sub-path wait and go.
@@ -193,7 +193,9 @@ impl EyeHooks<'_, '_> {
             leaving: -sample.wi,
             flux: flux(&sample.end, sample.radiance, -sample.wi, sample.distance, drawn),
         };
+        let started = tracer.begin(Work::Weights);
         let weight = self.direct_weight(vertex, &origin, &sample, density, bsdf_pdf);
+        tracer.end(Work::Weights, started);
         let segment = direct_segment(point, &sample);
         let found = self.found((1, t), (Some(origin), None), raw, weight);
         let arrived = &mut *self.queues.found;
@@ -309,7 +311,9 @@ impl EyeHooks<'_, '_> {
             arriving,
             adjoint: back.0,
         };
+        let started = tracer.begin(Work::Weights);
         let weight = self.this.weigher.weight(&split);
+        tracer.end(Work::Weights, started);
         let segment = segment(&SegmentEnd::Surface { p: z.p, error: z.error, ng: z.ng }, &y.end());
         let found = self.found((light.length(), t), (to.origin, to.number), raw, weight);
         let arrived = &mut *self.queues.found;
@@ -346,6 +350,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
             }
             let possible = |s: usize| (s + t - 1) as u64 <= u64::from(max_edges) && techniques.uses(s, t);
             let light = self.light;
+            let started = tracer.begin(Work::Connections);
             match &this.resampler {
                 None => {
                     for y in light.vertices.iter().filter(|y| possible(y.length())) {
@@ -359,6 +364,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
                     });
                 }
             }
+            tracer.end(Work::Connections, started);
         }
         (vertex.index as usize + 1) < self.this.most_eye_vertices
     }

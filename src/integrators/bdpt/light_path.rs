@@ -9,7 +9,7 @@ use crate::mis::{Joint, Lit, Node, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
-use crate::ray::{Ray, RayKind, Segment, T_MIN, Tracer};
+use crate::ray::{Ray, RayKind, Segment, T_MIN, Tracer, Work};
 use crate::shade::{BsdfPool, BsdfSample, KeptBsdf, SurfacePoint, Transport};
 
 /// A vertex y_{s−1} of a light sub-path, s ≥ 2, that eye vertices can be connected to. There are many of them: this is all that is needed.
@@ -236,7 +236,9 @@ impl LightHooks<'_, '_> {
             arriving: Rgb::BLACK,
             adjoint: Rgb::BLACK,
         };
+        let started = tracer.begin(Work::Weights);
         let weight = self.this.weigher.weight(&split);
+        tracer.end(Work::Weights, started);
         let filter = sampler.rng().next_4();
         self.splat(1, &lens, &segment, (raw, weight), [filter[0], filter[1]], tracer);
     }
@@ -267,7 +269,9 @@ impl LightHooks<'_, '_> {
             arriving: Rgb::BLACK,
             adjoint: Rgb::BLACK,
         };
+        let started = tracer.begin(Work::Weights);
         let weight = self.this.weigher.weight(&split);
+        tracer.end(Work::Weights, started);
         let from = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
         let segment = segment(&from, &SegmentEnd::Free(lens.p_near));
         self.splat(s, &lens, &segment, (raw, weight), [u[2], u[3]], tracer);
