@@ -254,6 +254,9 @@ fn a_profile_adds_up() {
     }
     let phases: f64 = found["phases"].as_object().unwrap().values().map(number).sum();
     assert!(phases > 0.5 * number(&found["wall_s"]) && phases <= 1.001 * number(&found["wall_s"]), "{found}");
+    let work = &found["work"];
+    assert_eq!(keys(work), BTreeSet::from(["connections", "weights"]));
+    assert!(work.as_object().unwrap().values().all(|w| (0.0..=phases).contains(&number(w))), "{work}");
     let share: f64 = found["rays"].as_object().unwrap().values().map(|k| number(&k["share"])).sum();
     assert!((share - 1.0).abs() < 1e-9);
     assert_eq!(found["replayed"][1], 0);
