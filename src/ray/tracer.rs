@@ -301,7 +301,8 @@ impl<'a> Tracer<'a> {
     }
 
     /// The first thing the ray meets; a ray that is not valid meets nothing and is counted.
-    #[inline]
+    // Out of line, ray and hit would go through memory.
+    #[inline(always)]
     pub fn closest(&mut self, ray: &Ray, kind: RayKind) -> Option<Hit> {
         if !ray.is_valid() {
             self.stats.invalid += 1;
