@@ -65,6 +65,13 @@ pub fn spread(cos: f32, dist2: f32) -> f32 {
     cos.abs() / dist2
 }
 
+/// c_1 of a light with extent: the density per steradian with which next event draws its point from the next vertex, over the area density
+/// `origin` with which light sub-paths begin there; `to_area` turns the one measure into the other.
+#[inline]
+pub fn next_event(direct: SolidAnglePdf, to_area: f32, origin: AreaPdf) -> f32 {
+    direct.0 * to_area / origin.0
+}
+
 /// The vertices of one sub-path, in the order in which they were made.
 #[derive(Clone, Debug, Default)]
 pub struct Side {

@@ -9,7 +9,7 @@ use crate::integrators::replay::{Contribution, Replay};
 use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{Joint, Node, Side, Split, Targets, There, Weight, spread};
+use crate::mis::{self, Joint, Node, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, segment};
@@ -147,7 +147,7 @@ impl EyeHooks<'_, '_> {
             // The direct density is per steradian at z_{t−2}, as the walk's own was before it was converted.
             let walked = edge.pdf.0 * edge.survival;
             let last = self.side.nodes()[t - 1].forward.0;
-            direct.0 * (last / walked) / origin.0
+            mis::next_event(direct, last / walked, origin)
         } else {
             1.0
         };
@@ -194,7 +194,7 @@ impl EyeHooks<'_, '_> {
             flux: flux(&sample.end, sample.radiance, -sample.wi, sample.distance, drawn),
         };
         let started = tracer.begin(Work::Weights);
-        let weight = self.direct_weight(vertex, &origin, &sample, density, bsdf_pdf);
+        let weight = self.direct_weight(vertex, &origin, &sample, (density, bsdf_pdf), (position, emission));
         tracer.end(Work::Weights, started);
         let segment = direct_segment(point, &sample);
         let found = self.found((1, t), (Some(origin), None), raw, weight);
@@ -222,8 +222,8 @@ impl EyeHooks<'_, '_> {
         vertex: &SurfaceVertex,
         from: &Origin,
         sample: &DirectSample,
-        density: SolidAnglePdf,
-        bsdf_pdf: SolidAnglePdf,
+        (density, bsdf_pdf): (SolidAnglePdf, SolidAnglePdf),
+        (position, emission): (AreaPdf, SolidAnglePdf),
     ) -> Weight {
         let t = vertex.index as usize + 1;
         let point = vertex.point;
@@ -231,7 +231,6 @@ impl EyeHooks<'_, '_> {
         let dist2 = sample.distance * sample.distance;
         let light = self.scene.lights.get(from.light);
         let chosen = self.scene.lights.pmf(from.light);
-        let (position, emission) = light.pdf_emission_given_vertex(-sample.wi);
         // Per steradian at the eye vertex → per unit area at the light vertex.
         let to_area = match sample.end {
             LightEnd::Surface { ng, .. } => spread(ng.dot(sample.wi), dist2),
@@ -249,7 +248,7 @@ impl EyeHooks<'_, '_> {
             eye: self.side.first(t),
             eye_lit: self.side.lit(),
             eye_joint: Joint { arrival: sample.end.next_density(position, emission, cos, dist2), departure: back.1 },
-            next_event: density.0 * to_area / origin.0,
+            next_event: mis::next_event(density, to_area, origin),
             light_can_be_hit: !light.is_delta(),
             factor: 1.0,
             arriving: from.flux,

@@ -5,7 +5,7 @@ use crate::emit::{EmissionSample, LensSample, LightEnd, LightId};
 use crate::integrators::replay::{Contribution, Replay};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{Joint, Lit, Node, Side, Split, Targets, There, Weight, spread};
+use crate::mis::{self, Joint, Lit, Node, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
@@ -290,7 +290,7 @@ impl LightHooks<'_, '_> {
             _ => vertex.edge.distance,
         };
         let direct = light.pdf_direct(vertex.point.p, vertex.wo, distance) * picked;
-        direct.0 * to_area / self.out.side.first(1)[0].forward.0
+        mis::next_event(direct, to_area, self.out.side.first(1)[0].forward)
     }
 }
 
