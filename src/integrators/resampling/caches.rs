@@ -40,7 +40,7 @@ pub(super) struct Cache {
 /// What a cache point found: the two targets (scattered first), and what it alone found of the first.
 pub(super) type Found = [f64; 3];
 
-/// What is known at a cache point: half a line of a cache, mostly.
+/// What is known at a cache point, in one line of the processor's cache.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Known {
