@@ -250,16 +250,21 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Makes a query, on the clock if it is its turn. There is one call only, so that it is inlined once.
+    /// It is the next query's turn to be timed.
     #[inline(always)]
-    fn timed<T>(&mut self, kind: RayKind, call: impl FnOnce(&Self) -> T) -> T {
+    fn its_turn(&mut self) -> bool {
         self.until_timed -= 1;
-        let start = if self.until_timed == 0 { self.start_clock() } else { None };
-        let out = call(self);
-        if let Some(start) = start {
-            self.stats.kinds[kind as usize].timed.stop_clock(start);
-        }
-        out
+        self.until_timed == 0
+    }
+
+    /// Makes a query on the clock.
+    #[inline]
+    fn on_the_clock<T>(&mut self, kind: RayKind, query: impl FnOnce(&dyn RayQuery) -> T) -> T {
+        self.until_timed = TIMED_ONE_IN;
+        let start = Instant::now();
+        let answer = query(self.query);
+        self.stats.kinds[kind as usize].timed.stop_clock(start);
+        answer
     }
 
     /// Counts a piece of work that begins; what is returned goes to [`Tracer::end`].
@@ -282,22 +287,11 @@ impl<'a> Tracer<'a> {
         }
     }
 
+    /// The closest hit when it is its turn to be timed. Apart and part by part, so that the way of all other rays stays in registers.
     #[cold]
-    fn start_clock(&mut self) -> Option<Instant> {
-        self.until_timed = TIMED_ONE_IN;
-        Some(Instant::now())
-    }
-
-    #[inline(always)]
-    fn closest_untimed(&self, ray: &Ray) -> Option<Hit> {
-        #[cfg(any(embree3, embree4))]
-        if let Some(embree) = self.embree {
-            return embree.first_hit(ray);
-        }
-        // Part by part both ways: what is only ever passed by reference on this way must not be kept in memory on the other.
-        let (o, d) = ([ray.o.x, ray.o.y, ray.o.z], [ray.d.x, ray.d.y, ray.d.z]);
-        let hit = elsewhere(self.query, o, d, [ray.t_min, ray.t_max])?;
-        Some(Hit { t: hit.t, u: hit.u, v: hit.v, triangle: hit.triangle, mesh: hit.mesh, instance: hit.instance })
+    #[inline(never)]
+    fn closest_on_the_clock(&mut self, o: [f32; 3], d: [f32; 3], t: [f32; 2], kind: RayKind) -> Option<Hit> {
+        self.on_the_clock(kind, |query| elsewhere(query, o, d, t))
     }
 
     /// The first thing the ray meets; a ray that is not valid meets nothing and is counted.
@@ -309,14 +303,29 @@ impl<'a> Tracer<'a> {
             return None;
         }
         self.stats.kinds[kind as usize].rays += 1;
-        self.timed(kind, |tracer| tracer.closest_untimed(ray))
+        // Part by part both ways: what is only ever passed by reference on this way must not be kept in memory on the other.
+        let (o, d, t) = ([ray.o.x, ray.o.y, ray.o.z], [ray.d.x, ray.d.y, ray.d.z], [ray.t_min, ray.t_max]);
+        let hit = if self.its_turn() {
+            self.closest_on_the_clock(o, d, t, kind)
+        } else {
+            #[cfg(any(embree3, embree4))]
+            if let Some(embree) = self.embree {
+                return embree.first_hit(ray);
+            }
+            elsewhere(self.query, o, d, t)
+        }?;
+        Some(Hit { t: hit.t, u: hit.u, v: hit.v, triangle: hit.triangle, mesh: hit.mesh, instance: hit.instance })
     }
 
     /// Bit `i` set: segment `i` is blocked. Segments that are not valid count as blocked.
     #[inline]
     pub fn occluded_packet(&mut self, packet: &SegmentPacket, kind: RayKind) -> u16 {
         debug_assert!(packet.len <= PACKET);
-        let (mask, invalid) = self.timed(kind, |tracer| tracer.query.occluded_packet(packet));
+        let (mask, invalid) = if self.its_turn() {
+            self.on_the_clock(kind, |query| query.occluded_packet(packet))
+        } else {
+            self.query.occluded_packet(packet)
+        };
         let stats = &mut self.stats.kinds[kind as usize];
         stats.rays += packet.len as u64;
         stats.packets += 1;
