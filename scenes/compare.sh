@@ -12,6 +12,7 @@
 #   samples      N = 1, 2, 4                    (weights), Fig. 9
 #   neighbours   N_c = 0, 1, 3                  (weights), section 6.1.5
 #   weights      what weights know              (weights), Fig. 2; (two stages), Fig. 10
+#   proposals    mixture against split          (weights), section 5.2; and what probabilities aim at
 #   first-stage  M_1 = 10^3 ... 10^5            (two stages), Fig. 6
 #   last-stage   M_2 = 50 ... 800               (two stages), Fig. 7
 #
@@ -52,6 +53,9 @@ for figure in ${FIGURES:-}; do
     weights)
         add pcbpt:paths=100 pcbpt:paths=10000 ris:paths=100 ris:paths=10000
         add two-stage:weights=balance two-stage:weights=ris two-stage:weights=two-stage
+        ;;
+    proposals)
+        for method in ris two-stage; do add $method $method:proposals=split $method:target=radiance $method:metric=plain; done
         ;;
     first-stage) for m in 1000 10000 100000; do add "two-stage:paths=$m"; done ;;
     last-stage) for m in 50 100 200 400 800; do add "two-stage:second_stage=$m"; done ;;

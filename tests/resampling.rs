@@ -16,12 +16,18 @@ const SPP: u64 = 32;
 #[test]
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
-    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 16] = [
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 22] = [
         (ris, &[("paths", "1")]),
         (ris, &[("paths", "2"), ("neighbours", "1")]),
         (ris, &[("paths", "200"), ("neighbours", "0")]),
         (ris, &[("weights", "balance"), ("keep", "100")]),
         (ris, &[("doubt", "0"), ("keep", "100"), ("skip", "never"), ("trust", "full")]),
+        (ris, &[("target", "radiance")]),
+        (ris, &[("proposals", "split"), ("paths", "7")]),
+        (ris, &[("proposals", "split"), ("neighbours", "1"), ("samples", "2")]),
+        (two, &[("proposals", "split"), ("second_stage", "8"), ("doubt", "0"), ("keep", "100"), ("skip", "never")]),
+        (two, &[("proposals", "split"), ("paths", "100"), ("second_stage", "100"), ("neighbours", "0")]),
+        (two, &[("target", "radiance"), ("metric", "plain")]),
         (ris, &[("epsilon", "1000000"), ("doubt", "1000000")]),
         (two, &[("second_stage", "1")]),
         (two, &[("second_stage", "16"), ("neighbours", "1"), ("samples", "3"), ("metric", "plain")]),

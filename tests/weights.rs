@@ -11,7 +11,7 @@ use lightsieve::integrators::replay::Contribution;
 use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, resampling};
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
 use lightsieve::mis::definition::{Densities, densities};
-use lightsieve::mis::{Heuristic, Joint, Node, Split, Techniques, There, Weigher};
+use lightsieve::mis::{Heuristic, Joint, Node, Split, Techniques, Weigher};
 use lightsieve::path::{FullPath, Limits};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
@@ -82,6 +82,7 @@ fn resampling_aware_weights_are_those_of_the_definition() {
             let paths = ["200", "7", "1"][i % 3];
             // A film of 64 pixels needs more than its share of cache points.
             let params = [
+                ("proposals", ["mixture", "split"][(i / 2) % 2]),
                 ("techniques", techniques),
                 ("rr_depth", roulette),
                 ("paths", paths),
@@ -136,6 +137,7 @@ fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
         light_joint,
         eye: &eye_nodes,
         eye_lit: &[],
+        eye_proposals: None,
         eye_joint,
         next_event: d.next_event as f32,
         light_can_be_hit: d.joinable[0],
@@ -155,7 +157,7 @@ fn weights_of_all_techniques_sum_to_one() {
         for path in &paths {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
                 let weigher = weigher(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], 5);
-                let d = densities(&scene, &weigher, &|_, _| There::default(), path);
+                let d = densities(&scene, &weigher, &|_, _| 1.0, path);
                 let slow = d.weights(&weigher);
                 // A subset need not have any technique that makes the path; single precision has no densities beyond its range.
                 let extreme = |p: &f64| *p > 0.0 && !(1e-15..1e15).contains(p);

@@ -1,11 +1,11 @@
 //! One sample, run again and written down: the tool with which a firefly or a value that is not finite is explained.
 
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
-use crate::mis::definition::densities;
-use crate::mis::{There, Weigher};
+use crate::mis::definition::{Joined, densities};
+use crate::mis::{Resampled, Weigher};
 use crate::path::{FullPath, Interior, Origin, SurfaceVertex};
 use crate::prepared::PreparedScene;
-use crate::shade::{BsdfSample, SurfacePoint};
+use crate::shade::BsdfSample;
 
 /// What happened in one sample of one pixel.
 #[derive(Clone, Debug, Default)]
@@ -107,17 +107,17 @@ impl Replay {
 
     /// Notes a contribution and its path; returns its number.
     ///
-    /// `there` is what is known of the light at a point, on the side of a direction, of integrators whose weights know of resampling.
+    /// `factor_of` is c of a connection, of integrators whose weights know of resampling.
     pub fn found(
         &mut self,
         scene: &PreparedScene,
         weigher: &Weigher,
-        there: &dyn Fn(&SurfacePoint, Vec3) -> There,
+        factor_of: &dyn Fn(&Resampled, &Joined) -> f32,
         mut contribution: Contribution,
         path: Option<FullPath>,
     ) -> u32 {
         if let Some(path) = &path {
-            let densities = densities(scene, weigher, there, path);
+            let densities = densities(scene, weigher, factor_of, path);
             contribution.techniques =
                 densities.log_shares(weigher).into_iter().zip(densities.weights(weigher)).collect();
         }

@@ -1,12 +1,12 @@
 //! The weights of a path by their definition: all densities of all its vertices from both ends, multiplied up in double
 //! precision logarithms (Veach 1997, §10.2). The oracle of [`Weigher`], and what explains a single sample.
 
-use super::{Targets, There, Weigher, spread};
+use super::{Resampled, Targets, Weigher, spread};
 use crate::emit::LightEnd;
 use crate::math::{Rgb, Vec3};
-use crate::path::FullPath;
+use crate::path::{FullPath, Interior};
 use crate::prepared::PreparedScene;
-use crate::shade::{SurfacePoint, Transport};
+use crate::shade::Transport;
 
 /// Densities of a path's vertices v_0 … v_k.
 #[derive(Clone, Debug)]
@@ -23,12 +23,31 @@ pub struct Densities {
     pub factors: Vec<f64>,
 }
 
-/// Densities of `path` where sub-paths play roulette as `weigher` says. `there` is what is known of the light at a point, on the side of a
-/// direction; only weights that know of resampling ask for it.
+/// Two neighbouring vertices of a path, of which the first could have been the last of a light sub-path that was resampled for the other.
+#[derive(Clone, Copy, Debug)]
+pub struct Joined<'a> {
+    /// The one nearer to the light.
+    pub y: &'a Interior,
+    /// Unit direction from `y` to the vertex before it.
+    pub from: Vec3,
+    /// The one nearer to the lens.
+    pub z: &'a Interior,
+    /// Unit direction from `y` to `z`.
+    pub to: Vec3,
+    /// Square of their distance.
+    pub distance2: f32,
+    /// β_L at `y`.
+    pub arriving: Rgb,
+    /// What the light sub-path brings to `z`.
+    pub brings: Targets,
+}
+
+/// Densities of `path` where sub-paths play roulette as `weigher` says. `factor_of` is c of a connection between two of its vertices; only
+/// weights that know of resampling ask for it.
 pub fn densities(
     scene: &PreparedScene,
     weigher: &Weigher,
-    there: &dyn Fn(&SurfacePoint, Vec3) -> There,
+    factor_of: &dyn Fn(&Resampled, &Joined) -> f32,
     path: &FullPath,
 ) -> Densities {
     let k = path.edges();
@@ -105,12 +124,17 @@ pub fn densities(
                 scattered: luminance(scattered),
                 unscattered: luminance(arriving) * v.point.ng.dot(to).abs(),
             };
-            arriving = scattered.map(|v| v / scatter(i - 1, from, to, true));
-            *factor = f64::from(resampled.factor(
+            let joined = Joined {
+                y: v,
+                from,
+                z: &path.interior[i - 1],
+                to,
+                distance2: path.edge(i - 1).1.powi(2),
+                arriving: Rgb::from(arriving.map(|v| v as f32)),
                 brings,
-                path.edge(i - 1).1.powi(2),
-                there(&path.interior[i - 1].point, -to),
-            ));
+            };
+            *factor = f64::from(factor_of(resampled, &joined));
+            arriving = scattered.map(|v| v / scatter(i - 1, from, to, true));
         }
     }
     Densities { light: from_light, eye: from_eye, joinable, next_event, factors }

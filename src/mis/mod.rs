@@ -11,12 +11,14 @@
 
 pub mod definition;
 pub mod effort;
+pub mod proposals;
 pub mod resampled;
 pub mod side;
 pub mod techniques;
 pub mod weigh;
 
 pub use effort::{Costs, Effort, EffortStatistics};
+pub use proposals::{Proposal, Proposals, Shares};
 pub use resampled::{Resampled, Targets, There};
 pub use side::{Lit, Node, Side, next_event, spread};
 pub use techniques::{Techniques, TechniquesError};

@@ -66,6 +66,8 @@ pub struct Resampled {
     pub uniform: f32,
     /// L, an estimate; 0 if nothing is known yet.
     pub vertices_per_path: f32,
+    /// Proposals are techniques of their own, see `mis::proposals`, and not parts of one mixture.
+    pub split: bool,
 }
 
 impl Resampled {
@@ -115,6 +117,7 @@ mod tests {
         doubt: 0.0,
         uniform: 0.25,
         vertices_per_path: 3.0,
+        split: false,
     };
 
     fn lit(scattered: f32) -> Targets {

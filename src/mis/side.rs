@@ -7,7 +7,7 @@
 //! Densities of a vertex at infinity are per steradian of its direction; the disk that emission rays start on stands in for
 //! the direction's density at the next vertex (see `emit::sample`). [`Node::spread`] hides the difference.
 
-use super::There;
+use super::{Proposals, There};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::{Edge, SurfaceVertex};
 use crate::shade::{BsdfSample, Transport};
@@ -78,6 +78,8 @@ pub struct Side {
     nodes: Vec<Node>,
     /// One for each node, or none at all.
     lit: Vec<Lit>,
+    /// For each node, the cache points near the vertex before as seen from it; only where weights want them.
+    proposals: Vec<Proposals>,
     aware: bool,
     cos_leaving: f32,
 }
@@ -87,6 +89,7 @@ impl Side {
     pub fn begin(&mut self, origin: AreaPdf, aware: bool) {
         self.nodes.clear();
         self.lit.clear();
+        self.proposals.clear();
         self.aware = aware;
         self.cos_leaving = 0.0;
         self.push(Node::origin(origin), 0.0, 0.0);
@@ -163,6 +166,20 @@ impl Side {
     #[inline]
     pub fn lit(&self) -> &[Lit] {
         &self.lit
+    }
+
+    /// How the cache points near the vertex before the last are seen from the last; those of vertices that are not given are none.
+    pub fn propose(&mut self, proposals: Proposals) {
+        self.proposals.resize(self.nodes.len(), Proposals::default());
+        if let Some(last) = self.proposals.last_mut() {
+            *last = proposals;
+        }
+    }
+
+    /// The cache points near the vertex before each, as seen from it, where weights want them.
+    #[inline]
+    pub fn proposals(&self) -> &[Proposals] {
+        &self.proposals
     }
 
     /// The first `n` vertices.

@@ -14,7 +14,7 @@
 //! resampled connection; all others are 1, or 0 if an end of the connection is a delta event. Roulette is part of the densities: where it is played is counted from the end that walks.
 
 use super::side::{Lit, Node};
-use super::{Heuristic, Resampled, Targets, Techniques};
+use super::{Heuristic, Proposals, Resampled, Targets, Techniques};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::Limits;
 
@@ -39,6 +39,9 @@ pub struct Split<'a> {
     pub eye: &'a [Node],
     /// What is known of the light at these vertices. Unused unless connections are resampled.
     pub eye_lit: &'a [Lit],
+    /// Where each proposal of a resampled connection is a technique: for z_0 … z_{t−2} the cache points near the vertex before, as
+    /// seen from it (none of those that are missing), and the ones near z_{t−2} as seen from z_{t−1}.
+    pub eye_proposals: Option<(&'a [Proposals], &'a Proposals)>,
     /// How the light sub-path would have gone on into them; unused if t = 1.
     pub eye_joint: Joint,
     /// c_1: density of v_0 under next event from v_1 over its density as origin of a light sub-path.
@@ -165,7 +168,7 @@ impl Weigher {
             true => (path.adjoint, path.eye_joint.departure.0),
             false => (lit.adjoint, lit.reverse),
         };
-        let scattered = *arriving * adjoint;
+        let (scattered, before) = (*arriving * adjoint, *arriving);
         let brings = Targets {
             scattered: scattered.luminance() * node.spread,
             unscattered: arriving.luminance() * lit.cos * node.spread,
@@ -173,6 +176,11 @@ impl Weigher {
         *arriving = scattered * (1.0 / (reverse * self.survival(node, t - 1 - n + s)));
         if n < 2 {
             return 1.0;
+        }
+        if resampled.split {
+            let proposals =
+                path.eye_proposals.and_then(|(others, last)| if n + 1 == t { Some(last) } else { others.get(n) });
+            return resampled.shares(before, proposals.unwrap_or(&Proposals::NONE)).sum();
         }
         resampled.factor(brings, lit.distance2, path.eye_lit[n - 1].there)
     }

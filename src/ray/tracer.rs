@@ -32,11 +32,13 @@ pub enum RayKind {
     Cache,
     /// Between a cache point and a light vertex.
     ShadowPmf,
+    /// The same, for a weight.
+    ShadowWeight,
 }
 
 impl RayKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [RayKind; 9] = [
+    pub const ALL: [RayKind; 10] = [
         RayKind::Camera,
         RayKind::Bounce,
         RayKind::ShadowDirect,
@@ -46,12 +48,13 @@ impl RayKind {
         RayKind::ShadowConnection,
         RayKind::Cache,
         RayKind::ShadowPmf,
+        RayKind::ShadowWeight,
     ];
 
     /// It asks only whether something is in the way.
     pub fn is_shadow(self) -> bool {
-        use RayKind::{ShadowConnection, ShadowDirect, ShadowLens, ShadowPmf};
-        matches!(self, ShadowDirect | ShadowLens | ShadowConnection | ShadowPmf)
+        use RayKind::{ShadowConnection, ShadowDirect, ShadowLens, ShadowPmf, ShadowWeight};
+        matches!(self, ShadowDirect | ShadowLens | ShadowConnection | ShadowPmf | ShadowWeight)
     }
 
     /// Name in statistics.
@@ -66,6 +69,7 @@ impl RayKind {
             RayKind::ShadowConnection => "shadow_connection",
             RayKind::Cache => "cache",
             RayKind::ShadowPmf => "shadow_pmf",
+            RayKind::ShadowWeight => "shadow_weight",
         }
     }
 }

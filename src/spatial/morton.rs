@@ -23,20 +23,19 @@ fn bounds(points: &[Vec3]) -> [Vec3; 2] {
     [points.iter().copied().fold(Vec3::INFINITY, Vec3::min), points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max)]
 }
 
-/// Places of all `points` on the curve through the box around them, left in `out`.
-pub fn codes(points: &[Vec3], out: &mut Vec<u32>) {
+/// Places of `points` on the curve through the box around them, each with the number of its point, in Morton order.
+pub fn sorted(points: &[Vec3]) -> Vec<(u32, u32)> {
     let [lo, hi] = bounds(points);
-    out.clear();
-    out.extend(points.iter().map(|p| code(*p, lo, hi)));
+    let key = |(i, p): (usize, &Vec3)| (code(*p, lo, hi), i as u32);
+    let mut keys: Vec<(u32, u32)> = points.par_iter().enumerate().map(key).collect();
+    // All keys differ: the order is the same for any number of threads.
+    keys.par_sort_unstable();
+    keys
 }
 
 /// Numbers of `points` in Morton order.
 pub fn order(points: &[Vec3]) -> Vec<u32> {
-    let [lo, hi] = bounds(points);
-    let mut keys: Vec<(u32, u32)> = points.iter().zip(0..).map(|(p, i)| (code(*p, lo, hi), i)).collect();
-    // All keys differ: the order is the same for any number of threads.
-    keys.par_sort_unstable();
-    keys.into_iter().map(|(_, i)| i).collect()
+    sorted(points).into_iter().map(|(_, i)| i).collect()
 }
 
 #[cfg(test)]

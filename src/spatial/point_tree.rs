@@ -4,14 +4,15 @@
 //! highest differing bit of its codes changes. A cut starts with the root and always splits the cluster whose brightness is known worst
 //! (as lightcuts do, Walter et al. 2005), until there are as many clusters as wanted. Clusters of a cut are a partition of the points.
 
-use super::morton;
 use crate::math::Vec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-/// Ranges of at most so many points are not split further.
+/// Ranges of at most so many points are not split further, and none of at most as many as all have on average when there are `LEAVES`:
+/// cuts have some hundreds of clusters.
 const LEAF: usize = 2;
+const LEAVES: usize = 1 << 14;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -30,8 +31,6 @@ pub struct PointTree {
     nodes: Vec<Node>,
     /// Sum of the weights of all points before each, and of all.
     sums: Vec<f64>,
-    /// Codes of the points, while building.
-    codes: Vec<u32>,
 }
 
 /// Where a cut is looked at from: a ball of places whose surfaces face about the same way.
@@ -76,28 +75,29 @@ impl Ord for Open {
 pub struct CutMemory(BinaryHeap<Open>);
 
 impl PointTree {
-    /// Builds the tree anew over `points`, which are in Morton order ([`morton::order`]), with weights that are not negative.
-    pub fn build(&mut self, points: &[Vec3], weights: impl Iterator<Item = f32>) {
+    /// Builds the tree anew over points in Morton order ([`morton::sorted`](super::morton::sorted)), each with its position and its weight,
+    /// which is not negative, and their codes.
+    pub fn build(&mut self, codes: &[u32], points: &[(Vec3, f32)]) {
         self.nodes.clear();
         self.sums.clear();
-        let mut sum = 0.0;
+        let (count, mut sum) = (points.len(), 0.0);
         self.sums.push(0.0);
-        self.sums.extend(weights.take(points.len()).map(|w| {
-            sum += f64::from(w);
+        self.sums.extend(points.iter().map(|&(_, weight)| {
+            sum += f64::from(weight);
             sum
         }));
-        if points.is_empty() {
+        if count == 0 {
             return;
         }
-        morton::codes(points, &mut self.codes);
-        let root = Node { centre: Vec3::ZERO, radius: 0.0, first: 0, end: points.len() as u32, child: 0 };
+        let leaf = LEAF.max(count / LEAVES);
+        let root = Node { centre: Vec3::ZERO, radius: 0.0, first: 0, end: count as u32, child: 0 };
         self.nodes.push(root);
         // Children come after their parents: boxes are put together backwards.
         let mut at = 0;
         while at < self.nodes.len() {
             let Node { first, end, .. } = self.nodes[at];
-            if (end - first) as usize > LEAF {
-                let middle = split(&self.codes, first as usize..end as usize) as u32;
+            if (end - first) as usize > leaf {
+                let middle = split(codes, first as usize..end as usize) as u32;
                 self.nodes[at].child = self.nodes.len() as u32;
                 self.nodes.extend([(first, middle), (middle, end)].map(|(first, end)| Node { first, end, ..root }));
             }
@@ -108,7 +108,7 @@ impl PointTree {
             let Node { first, end, child, .. } = self.nodes[i];
             let (lo, hi) = if child == 0 {
                 let own = &points[first as usize..end as usize];
-                own.iter().fold(boxes[i], |(lo, hi), p| (lo.min(*p), hi.max(*p)))
+                own.iter().fold(boxes[i], |(lo, hi), (p, _)| (lo.min(*p), hi.max(*p)))
             } else {
                 let (a, b) = (boxes[child as usize], boxes[child as usize + 1]);
                 (a.0.min(b.0), a.1.max(b.1))
@@ -211,6 +211,7 @@ fn split(codes: &[u32], range: Range<usize>) -> usize {
 mod tests {
     use super::*;
     use crate::math::hash::HashRng;
+    use crate::spatial::morton;
 
     fn tree(n: usize, seed: u64) -> (PointTree, Vec<Vec3>, Vec<f32>) {
         let mut rng = HashRng::new(seed, 1, 2, 3);
@@ -221,10 +222,13 @@ mod tests {
                 if i % 7 == 0 { Vec3::splat(0.25) } else { Vec3::new(x, if i % 3 == 0 { 0.5 } else { y }, z) * 10.0 }
             })
             .collect();
-        points = morton::order(&points).into_iter().map(|i| points[i as usize]).collect();
+        let sorted = morton::sorted(&points);
+        points = sorted.iter().map(|&(_, i)| points[i as usize]).collect();
         let weights: Vec<f32> = (0..n).map(|i| if i % 5 == 0 { 0.0 } else { rng.next_f32() }).collect();
         let mut tree = PointTree::default();
-        tree.build(&points, weights.iter().copied());
+        let codes: Vec<u32> = sorted.into_iter().map(|(code, _)| code).collect();
+        let weighed: Vec<(Vec3, f32)> = points.iter().copied().zip(weights.iter().copied()).collect();
+        tree.build(&codes, &weighed);
         (tree, points, weights)
     }
 

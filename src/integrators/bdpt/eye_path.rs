@@ -6,10 +6,13 @@ use crate::emit::LightId;
 use crate::emit::{DirectSample, LightEnd};
 use crate::integrators::Iteration;
 use crate::integrators::replay::{Contribution, Replay};
+use crate::integrators::resampling::Resampler;
+use crate::integrators::resampling::split::Near;
 use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{self, Joint, Node, Side, Split, Targets, There, Weight, spread};
+use crate::mis::definition::Joined;
+use crate::mis::{self, Joint, Node, Proposals, Resampled, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, segment};
@@ -23,6 +26,9 @@ pub(in crate::integrators) struct EyeQueues<'a> {
     /// Takes what has arrived.
     pub found: &'a mut dyn FnMut(Arrival, Found),
 }
+
+/// Of a light that was hit: no connection ends there.
+static NO_PROPOSALS: Proposals = Proposals::NONE;
 
 /// How a contribution was made known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +54,8 @@ pub(in crate::integrators) struct Candidate<'a> {
     pub origin: Option<Origin>,
     /// Number of the sub-path among those of the iteration, if it was drawn from many.
     pub number: Option<u32>,
+    /// The proposal that drew it, where each is a technique of its own.
+    pub proposal: Option<usize>,
     /// One over the expected number of times that this sub-path is drawn for one of its kind.
     pub scale: f32,
 }
@@ -63,6 +71,7 @@ impl<'a> Candidate<'a> {
             light_can_be_hit: path.light_can_be_hit,
             origin: path.origin,
             number: None,
+            proposal: None,
             scale,
         }
     }
@@ -88,6 +97,8 @@ pub(in crate::integrators) struct EyeHooks<'a, 'q> {
     pub side: &'a mut Side,
     /// What is known of the light at the last vertex, on either side of its surface, as far as it was asked for.
     pub known: [Option<There>; 2],
+    /// The cache points near the vertex before the last, and which of them see the last, where weights ask for them.
+    pub near_before: (Near, u16),
     pub pixel: (u32, u32),
     /// z_0.
     pub lens: Vec3,
@@ -116,8 +127,10 @@ impl EyeHooks<'_, '_> {
                 origin
             });
             let path = origin.map(|origin| record.path(origin, s, n_eye, lens));
-            let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(There::default(), |r| r.there(p, d));
-            record.found(scene, weigher, &there, Contribution::new((s, t), pixel, raw, weight.own), path)
+            let factor_of = |resampled: &Resampled, joined: &Joined| {
+                resampler.as_ref().map_or(1.0, |r| r.factor_of(scene, resampled, joined))
+            };
+            record.found(scene, weigher, &factor_of, Contribution::new((s, t), pixel, raw, weight.own), path)
         });
         Found { x: pixel.0, y: pixel.1, path: 0, note, s: s as u16, t: t as u16, raw, weight }
     }
@@ -156,6 +169,7 @@ impl EyeHooks<'_, '_> {
             light_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             eye: self.side.nodes(),
             eye_lit: self.side.lit(),
+            eye_proposals: self.split().map(|_| (self.side.proposals(), &NO_PROPOSALS)),
             eye_joint: Joint { arrival: origin, departure },
             next_event,
             light_can_be_hit: true,
@@ -217,6 +231,21 @@ impl EyeHooks<'_, '_> {
         *self.known[usize::from(point.ng.dot(d) < 0.0)].get_or_insert_with(|| resampler.there(point, d))
     }
 
+    /// How the cache points near the vertex before see `vertex`, from which they would get the light that comes along `from`; only if
+    /// weights ask for it.
+    #[inline]
+    fn proposals_before(&self, vertex: &SurfaceVertex, from: Vec3) -> Option<Proposals> {
+        let (near, seen) = &self.near_before;
+        let value = |to: Vec3| vertex.bsdf.eval(from, to, Transport::Importance);
+        let at = (vertex.point.p, vertex.point.ng);
+        self.split().map(|resampler| resampler.proposals(near, at, *seen, value))
+    }
+
+    /// The resampler, if its proposals are techniques of their own.
+    fn split(&self) -> Option<&Resampler> {
+        self.this.resampler.as_ref().filter(|resampler| resampler.settings.split)
+    }
+
     fn direct_weight(
         &self,
         vertex: &SurfaceVertex,
@@ -238,7 +267,7 @@ impl EyeHooks<'_, '_> {
         };
         let origin = sample.end.vertex_density(position, emission) * chosen;
         let walked = bsdf_pdf.0 * self.this.weigher.eye_limits.survival(vertex.index, vertex.bsdf);
-        let back = self.back(vertex, sample.wi);
+        let (back, proposals) = (self.back(vertex, sample.wi), self.proposals_before(vertex, sample.wi));
         let split = Split {
             light: &[Node::origin(origin)],
             light_joint: Joint {
@@ -247,6 +276,7 @@ impl EyeHooks<'_, '_> {
             },
             eye: self.side.first(t),
             eye_lit: self.side.lit(),
+            eye_proposals: proposals.as_ref().map(|last| (self.side.proposals(), last)),
             eye_joint: Joint { arrival: sample.end.next_density(position, emission, cos, dist2), departure: back.1 },
             next_event: mis::next_event(density, to_area, origin),
             light_can_be_hit: !light.is_delta(),
@@ -277,18 +307,26 @@ impl EyeHooks<'_, '_> {
             return;
         }
         let (at_light, light_pdf) = to.bsdf.eval_and_pdf(light.wo, -to_light, Transport::Importance);
-        let raw = vertex.throughput * at_eye * at_light * light.throughput * (to.scale / dist2);
+        let mut raw = vertex.throughput * at_eye * at_light * light.throughput * (to.scale / dist2);
         if raw.is_black() {
             return;
         }
         let weigher = &self.this.weigher;
         let eye_pdf = eye_pdf.0 * weigher.eye_limits.survival(vertex.index, vertex.bsdf);
         let light_pdf = light_pdf.0 * light.survival;
-        let back = self.back(vertex, to_light);
+        let (back, proposals) = (self.back(vertex, to_light), self.proposals_before(vertex, to_light));
         let scattered = light.throughput * at_light;
         let arriving = scattered * (1.0 / light_pdf);
         let spread_z = spread(z.ng.dot(to_light), dist2);
         let factor = weigher.resampled.map_or(1.0, |resampled| {
+            if let (Some(proposal), Some(resampler)) = (to.proposal, &self.this.resampler) {
+                let near = resampler.near(z.p, z.ng);
+                let proposals = resampler.proposals_of(&near, light, &to.bsdf, tracer);
+                let shares = resampled.shares(light.throughput, &proposals);
+                // Of what all proposals make of the path, this one makes its share.
+                raw *= shares.of(proposal) / shares.sum();
+                return shares.sum();
+            }
             let brings = Targets {
                 scattered: scattered.luminance() * spread_z,
                 unscattered: light.throughput.luminance() * y.ng.dot(to_light).abs() * spread_z,
@@ -303,6 +341,7 @@ impl EyeHooks<'_, '_> {
             },
             eye: self.side.first(t),
             eye_lit: self.side.lit(),
+            eye_proposals: proposals.as_ref().map(|last| (self.side.proposals(), last)),
             eye_joint: Joint { arrival: AreaPdf(light_pdf * spread_z), departure: back.1 },
             next_event: to.next_event,
             light_can_be_hit: to.light_can_be_hit,
@@ -338,6 +377,12 @@ impl WalkHooks for EyeHooks<'_, '_> {
         }
         if vertex.bsdf.is_black() {
             return false;
+        }
+        if vertex.index > 1
+            && let Some(resampler) = self.split()
+        {
+            let end = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
+            self.near_before.1 = resampler.seen_by(&self.near_before.0, &end, tracer);
         }
         let max_edges = self.this.weigher.eye_limits.max_edges;
         if vertex.index < max_edges && vertex.bsdf.connectable() {
@@ -381,6 +426,16 @@ impl WalkHooks for EyeHooks<'_, '_> {
             if let Some(lit) = self.side.last_lit_mut() {
                 (lit.there, lit.adjoint, lit.reverse) = (there, value, reverse.0);
             }
+        }
+        if let Some(resampler) = self.split() {
+            let near = resampler.near(vertex.point.p, vertex.point.ng);
+            if vertex.index > 1
+                && !sample.delta
+                && let Some(proposals) = self.proposals_before(vertex, sample.wi)
+            {
+                self.side.propose(proposals);
+            }
+            self.near_before = (near, 0);
         }
         if let Some(record) = &mut self.record {
             record.leaving(true, sample);

@@ -5,12 +5,13 @@ use crate::emit::{EmissionSample, LensSample, LightEnd, LightId};
 use crate::integrators::replay::{Contribution, Replay};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
-use crate::mis::{self, Joint, Lit, Node, Side, Split, Targets, There, Weight, spread};
+use crate::mis::definition::Joined;
+use crate::mis::{self, Joint, Lit, Node, Resampled, Side, Split, Targets, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
 use crate::ray::{Ray, RayKind, Segment, T_MIN, Tracer, Work};
-use crate::shade::{BsdfPool, BsdfSample, KeptBsdf, SurfacePoint, Transport};
+use crate::shade::{BsdfPool, BsdfSample, KeptBsdf, Transport};
 
 /// A vertex y_{s−1} of a light sub-path, s ≥ 2, that eye vertices can be connected to. There are many of them: this is all that is needed.
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +97,8 @@ pub(in crate::integrators) fn trace(
     out.light_can_be_hit = !light.is_delta();
     let flux = emission.flux() * (1.0 / chosen.0);
     out.origin = Some(Origin { light: id, end: emission.end, leaving: emission.direction, flux });
+    // Proposals that are techniques of their own are asked from the vertex before.
+    let keep = keep || this.resampler.as_ref().is_some_and(|r| r.settings.split);
     let mut hooks =
         LightHooks { this, scene, id, chosen, emission: &emission, luminance_before: 0.0, out, lens, record, keep };
     hooks.emitter_to_lens([v[2], v[3]], tracer, sampler);
@@ -174,8 +177,10 @@ impl LightHooks<'_, '_> {
         let (origin, resampler) = (self.out.origin, &self.this.resampler);
         let note = self.record.as_mut().map_or(0, |record| {
             let path = origin.map(|o| record.path(Origin { leaving, ..o }, s, 0, lens.p));
-            let there = |p: &SurfacePoint, d: Vec3| resampler.as_ref().map_or(There::default(), |r| r.there(p, d));
-            record.found(scene, weigher, &there, Contribution::new((s, 1), (x, y), raw, weight.own), path)
+            let factor_of = |resampled: &Resampled, joined: &Joined| {
+                resampler.as_ref().map_or(1.0, |r| r.factor_of(scene, resampled, joined))
+            };
+            record.found(scene, weigher, &factor_of, Contribution::new((s, 1), (x, y), raw, weight.own), path)
         });
         let Some(queue) = &mut self.lens else { return };
         let found = Found { x, y, note, path: queue.path, s: s as u16, t: 1, raw, weight };
@@ -229,6 +234,7 @@ impl LightHooks<'_, '_> {
             light_joint: Joint { arrival: AreaPdf(direction.0 * to_area), departure: SolidAnglePdf(0.0) },
             eye: &[Node::origin(lens.pdf)],
             eye_lit: &[Lit::default()],
+            eye_proposals: None,
             eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             next_event: 1.0,
             light_can_be_hit: !light.is_delta(),
@@ -262,6 +268,7 @@ impl LightHooks<'_, '_> {
             light_joint: Joint { arrival: AreaPdf(direction.0 * to_area), departure: back },
             eye: &[Node::origin(lens.pdf)],
             eye_lit: &[Lit::default()],
+            eye_proposals: None,
             eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             next_event: self.out.next_event,
             light_can_be_hit: self.out.light_can_be_hit,
@@ -275,6 +282,32 @@ impl LightHooks<'_, '_> {
         let from = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
         let segment = segment(&from, &SegmentEnd::Free(lens.p_near));
         self.splat(s, &lens, &segment, (raw, weight), [u[2], u[3]], tracer);
+    }
+
+    /// c of the connection that ends at `vertex`, where the sub-path came with the area density `forward`.
+    #[inline]
+    fn factor(&self, vertex: &SurfaceVertex, forward: AreaPdf, tracer: &mut Tracer) -> f32 {
+        let (Some(resampler), Some(resampled)) = (&self.this.resampler, &self.this.weigher.resampled) else {
+            return 1.0;
+        };
+        let (point, distance) = (vertex.point, vertex.edge.distance);
+        if resampled.split {
+            let near = resampler.near(point.p, point.ng);
+            // A vertex that cannot be connected to was not kept, and has no proposals.
+            let before = self.out.vertices.last().filter(|y| y.s == vertex.index);
+            return before.map_or(1.0, |y| {
+                let bsdf = self.out.bsdfs.get(&y.bsdf, y.ng);
+                resampled.shares(y.throughput, &resampler.proposals_of(&near, y, &bsdf, tracer)).sum()
+            });
+        }
+        let dist2 = distance * distance;
+        let here = spread(point.ng.dot(vertex.wo), dist2);
+        // What the sub-path brings here is its throughput times the density of having come here.
+        let brings = Targets {
+            scattered: vertex.throughput.luminance() * forward.0,
+            unscattered: self.luminance_before * self.out.side.cos_leaving().abs() * here,
+        };
+        resampled.factor(brings, dist2, resampler.there(point, vertex.wo))
     }
 
     /// c_1 of paths whose first two vertices are the light's and `vertex`.
@@ -321,17 +354,9 @@ impl WalkHooks for LightHooks<'_, '_> {
             self.out.next_event = self.next_event(vertex, to_light);
         } else {
             let forward = self.out.side.arrive_on(vertex, eye_survival);
-            let cos_leaving = self.out.side.cos_leaving();
-            let this = self.this;
-            if let (Some(resampler), Some(resampled), Some(node)) =
-                (&this.resampler, &this.weigher.resampled, self.out.side.last_mut())
-            {
-                // What the sub-path brings here is its throughput times the density of having come here.
-                let brings = Targets {
-                    scattered: vertex.throughput.luminance() * forward.0,
-                    unscattered: self.luminance_before * cos_leaving.abs() * spread(cos, dist2),
-                };
-                node.factor = resampled.factor(brings, dist2, resampler.there(point, vertex.wo));
+            let factor = self.factor(vertex, forward, tracer);
+            if let Some(node) = self.out.side.last_mut() {
+                node.factor = factor;
             }
         }
         if let Some(record) = &mut self.record {

@@ -17,7 +17,7 @@ pub(super) mod sizing;
 mod worker;
 
 use super::resampling::Resampler;
-use super::resampling::store::LightStore;
+use super::resampling::store::{LightStore, Part};
 use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params, Replay};
 use crate::film::{Film, FilmTile, LightImage, Pyramid, SampleBuffer};
 use crate::math::Rgb;
@@ -273,6 +273,7 @@ impl Bidirectional {
             light: &worker.light,
             side: &mut worker.eye,
             known: [None; 2],
+            near_before: Default::default(),
             pixel: (x, y),
             lens: eye.origin,
             record,
@@ -301,9 +302,9 @@ impl Bidirectional {
             false => 0,
         };
         let all = splat.max(kept);
-        let one_piece = |worker: &mut Worker, chunk: u32| {
-            let (mut tracer, mut store) = (Tracer::new(&*scene.query), LightStore::default());
-            let first = chunk * LIGHT_PATHS_AT_ONCE;
+        let one_piece = |worker: &mut Worker, (chunk, part): (usize, &mut Part)| {
+            let mut tracer = Tracer::new(&*scene.query);
+            let first = chunk as u32 * LIGHT_PATHS_AT_ONCE;
             for path in first..all.min(first + LIGHT_PATHS_AT_ONCE) {
                 let keep = path < kept;
                 if path < splat {
@@ -313,21 +314,13 @@ impl Bidirectional {
                     light_path::trace(self, scene, &mut sampler, &mut tracer, &mut worker.light, None, None, keep);
                 }
                 if keep {
-                    store.keep(path, &worker.light);
+                    part.keep(path, &worker.light);
                 }
             }
-            (worker.finish(self, tracer), store)
+            worker.finish(self, tracer)
         };
-        let pieces: Vec<(Piece, LightStore)> =
-            (0..all.div_ceil(LIGHT_PATHS_AT_ONCE)).into_par_iter().map_init(Worker::new, one_piece).collect();
-        store.clear();
-        pieces
-            .into_iter()
-            .map(|(piece, part)| {
-                store.append(&part);
-                piece
-            })
-            .collect()
+        let parts = store.begin(all.div_ceil(LIGHT_PATHS_AT_ONCE));
+        parts.par_iter_mut().enumerate().map_init(Worker::new, one_piece).collect()
     }
 
     fn render_tile(

@@ -66,6 +66,8 @@ fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> S
         doubt: 0.0,
         trust: false,
         metric: Metric::Facing,
+        radiance: false,
+        split: false,
         weights: Weights::Balance,
     }
 }

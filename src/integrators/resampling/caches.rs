@@ -12,7 +12,7 @@ use crate::path::{Edge, Limits, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, Ray, RayKind, RayStats, Tracer};
-use crate::shade::Transport;
+use crate::shade::{BsdfPool, KeptBsdf, Transport};
 use crate::spatial::NearestPoints;
 use crate::spatial::nearest::MOST;
 use crate::spatial::point_tree::Viewpoint;
@@ -35,6 +35,9 @@ pub(super) struct Cache {
     pub side: Vec3,
     pub error: f32,
     pub ng: Vec3,
+    /// Unit direction towards the vertex before.
+    wo: Vec3,
+    bsdf: KeptBsdf,
 }
 
 /// What a cache point found: the two targets (scattered first), and what it alone found of the first.
@@ -61,6 +64,8 @@ pub(in crate::integrators) struct Caches {
     pub groups: Vec<Range<usize>>,
     /// For each point, three others of its group that are nearest: bits of their places in the group.
     pub companions: Vec<u16>,
+    /// How each point looks to the eye, where that matters.
+    looks: Option<Looks>,
     /// What is asked of each point at every vertex, in one piece.
     known: Vec<Known>,
     trusted: bool,
@@ -69,8 +74,19 @@ pub(in crate::integrators) struct Caches {
     iterations: u64,
 }
 
+/// How cache points look to the eye sub-paths that made them.
+#[derive(Debug)]
+struct Looks {
+    each: Vec<(Vec3, KeptBsdf)>,
+    bsdfs: BsdfPool,
+}
+
 /// Collects the connectable vertices of a walk.
-struct Collect(Vec<Cache>);
+#[derive(Default)]
+struct Collect {
+    caches: Vec<Cache>,
+    bsdfs: BsdfPool,
+}
 
 impl WalkHooks for Collect {
     fn surface(&mut self, v: &SurfaceVertex, _tracer: &mut Tracer, _sampler: &mut PathSampler) -> bool {
@@ -80,7 +96,8 @@ impl WalkHooks for Collect {
         if v.bsdf.connectable() {
             let ng = v.point.ng;
             let side = if ng.dot(v.wo) < 0.0 { -ng } else { ng };
-            self.0.push(Cache { p: v.point.p, side, error: v.point.error, ng });
+            let bsdf = self.bsdfs.keep(v.bsdf);
+            self.caches.push(Cache { p: v.point.p, side, error: v.point.error, ng, wo: v.wo, bsdf });
         }
         true
     }
@@ -126,7 +143,7 @@ impl Caches {
 
     /// The vertices of eye sub-paths, as many as `settings` say. If there are two stages, all neighbours of a place are of one group.
     pub fn new(scene: &PreparedScene, seed: u64, settings: &Settings, limits: &Limits) -> (Caches, RayStats) {
-        let (mut all, stats) = place(scene, seed, settings.cache_fraction, limits);
+        let (mut all, bsdfs, stats) = place(scene, seed, settings.cache_fraction, limits);
         let metric = settings.metric;
         // Stable sorts and selections on equal input: the same for any number of threads.
         all.sort_by_key(|c| metric.kind(c.side));
@@ -152,13 +169,27 @@ impl Caches {
         let know = |(c, unlike_at): (&Cache, f32)| Known { p: c.p, unlike_at, side: c.side, means: [0.0; 3] };
         let known = all.iter().zip(unlike_at).map(know).collect();
         let sums = vec![[0.0; 3]; all.len()];
-        (Caches { index, ends, groups, companions, known, trusted: settings.trust, sums, iterations: 0 }, stats)
+        let looks = settings.radiance.then(|| Looks { each: all.iter().map(|c| (c.wo, c.bsdf)).collect(), bsdfs });
+        (Caches { index, ends, groups, companions, looks, known, trusted: settings.trust, sums, iterations: 0 }, stats)
     }
 
     /// A cache point's end of a shadow ray.
     #[inline]
     pub fn end(&self, cache: usize) -> &SegmentEnd {
         &self.ends[cache]
+    }
+
+    /// What probabilities at a cache point aim at, for light from the point `y` that brings `irradiance` there.
+    #[inline]
+    pub fn aim(&self, cache: usize, y: Vec3, irradiance: f32) -> f32 {
+        let Some(Looks { each, bsdfs }) = &self.looks else { return irradiance };
+        let (wo, bsdf) = &each[cache];
+        let Known { p, side, .. } = self.known[cache];
+        let from = (y - p).normalize_or_zero();
+        let SegmentEnd::Surface { ng, .. } = self.ends[cache] else { return irradiance };
+        // The cosine is part of the irradiance, and of the value again.
+        let aim = bsdfs.get(bsdf, ng).eval(*wo, from, Transport::Radiance).luminance() * irradiance / side.dot(from);
+        if aim.is_finite() { aim } else { 0.0 }
     }
 
     /// The ball around a group of cache points.
@@ -198,6 +229,13 @@ impl Caches {
         There { all, missed: missed.max(unlike), blur2 }
     }
 
+    /// Means over iterations so far of what a cache point found: its Q of both targets.
+    #[inline]
+    pub fn all(&self, cache: usize) -> Targets {
+        let [scattered, unscattered, _] = self.known[cache].means;
+        Targets { scattered, unscattered }
+    }
+
     /// Adds what an iteration found to the means.
     pub fn learn<'a>(&mut self, found: impl Iterator<Item = &'a Found>) {
         for (sum, own) in self.sums.iter_mut().zip(found) {
@@ -230,8 +268,13 @@ impl Caches {
     }
 }
 
-/// The vertices of `fraction` times as many eye sub-paths as the full picture has pixels.
-pub(super) fn place(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits) -> (Vec<Cache>, RayStats) {
+/// The vertices of `fraction` times as many eye sub-paths as the full picture has pixels, with their BSDFs.
+pub(super) fn place(
+    scene: &PreparedScene,
+    seed: u64,
+    fraction: f64,
+    limits: &Limits,
+) -> (Vec<Cache>, BsdfPool, RayStats) {
     let [width, height] = scene.film_size.map(f64::from);
     let scale = fraction.sqrt();
     let [columns, rows] = [width, height].map(|s| ((s * scale).round() as u64).max(1));
@@ -250,32 +293,35 @@ pub(super) fn place(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Li
                 delta: false,
                 kind: RayKind::Cache,
             };
-            let (mut collect, mut tracer) = (Collect(vec![]), Tracer::new(&*scene.query));
+            let (mut collect, mut tracer) = (Collect::default(), Tracer::new(&*scene.query));
             walk(scene, start, limits, Transport::Radiance, &mut tracer, &mut sampler, &mut collect);
             (collect, tracer.stats)
         })
         .collect();
     let mut stats = RayStats::default();
-    let mut all = vec![];
+    let (mut all, mut bsdfs) = (vec![], BsdfPool::default());
     for (collect, s) in pieces {
         stats.merge(&s);
-        all.extend(collect.0);
+        let moved = bsdfs.append(&collect.bsdfs);
+        all.extend(collect.caches.into_iter().map(|c| Cache { bsdf: c.bsdf.moved(moved), ..c }));
     }
-    (all, stats)
+    (all, bsdfs, stats)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::hash::HashRng;
+    use crate::shade::{Bsdf, SurfacePoint};
 
     #[test]
     fn groups_are_full_and_near() {
-        let mut rng = HashRng::new(5, 6, 7, 8);
+        let (mut rng, mut pool) = (HashRng::new(5, 6, 7, 8), BsdfPool::default());
         let mut points: Vec<Cache> = (0..1000)
             .map(|_| {
                 let [x, y, z, _] = rng.next_4();
-                Cache { p: Vec3::new(x, y, z), side: Vec3::Z, error: 0.0, ng: Vec3::Z }
+                let (p, n) = (Vec3::new(x, y, z), Vec3::Z);
+                Cache { p, side: n, error: 0.0, ng: n, wo: n, bsdf: pool.keep(&Bsdf::empty(&SurfacePoint::default())) }
             })
             .collect();
         let mut groups = vec![];

@@ -197,7 +197,7 @@ fn bring(
     }
     for (v, &number) in vertices.iter().enumerate() {
         let y = store.vertex(number as usize);
-        let (bsdf, end) = (store.bsdf(y), y.end());
+        let (bsdf, end) = (store.bsdf(number as usize), y.end());
         let mut packet = SegmentPacket::default();
         let mut asked = [0usize; PACKET];
         for site in 0..group.len() {

@@ -26,6 +26,7 @@ mod combined;
 mod prepare;
 pub(in crate::integrators) mod resampler;
 mod sites;
+pub(in crate::integrators) mod split;
 pub(in crate::integrators) mod store;
 
 use super::bdpt::sizing;
@@ -91,6 +92,16 @@ const METRIC: ParamSpec = ParamSpec {
     about: "the nearest cache points of a place are those on surfaces that face about the same way, or those of any surface (plain)",
     default: ParamDefault::Choice("facing", &["facing", "plain"]),
 };
+const TARGET: ParamSpec = ParamSpec {
+    name: "target",
+    about: "what probabilities at a cache point are proportional to: irradiance, the light that a sub-path brings there; radiance, what of it the surface there sends back to the eye",
+    default: ParamDefault::Choice("irradiance", &["irradiance", "radiance"]),
+};
+const PROPOSALS: ParamSpec = ParamSpec {
+    name: "proposals",
+    about: "mixture: eye vertices draw from one mixture of the probabilities around and a uniform share; split: each of these is a technique with a weight of its own, as published (target=irradiance, metric=plain; not with weights=balance)",
+    default: ParamDefault::Choice("mixture", &["mixture", "split"]),
+};
 const SKIP: ParamSpec = sizing::parameter("auto");
 const fn weights(default: &'static str, choices: &'static [&'static str]) -> ParamSpec {
     ParamSpec {
@@ -101,7 +112,7 @@ const fn weights(default: &'static str, choices: &'static [&'static str]) -> Par
 }
 
 /// The parameters of methods with one stage; they differ in the weights they take by default.
-const fn one_stage(default_weights: &'static str) -> [ParamSpec; 15] {
+const fn one_stage(default_weights: &'static str) -> [ParamSpec; 17] {
     let weights = weights(default_weights, &["balance", "ris"]);
     [
         MAX_DEPTH,
@@ -114,6 +125,8 @@ const fn one_stage(default_weights: &'static str) -> [ParamSpec; 15] {
         NEIGHBOURS,
         CACHES,
         METRIC,
+        TARGET,
+        PROPOSALS,
         EPSILON,
         DOUBT,
         TRUST,
@@ -122,9 +135,9 @@ const fn one_stage(default_weights: &'static str) -> [ParamSpec; 15] {
     ]
 }
 
-const PCBPT_PARAMS: [ParamSpec; 15] = one_stage("balance");
-const RIS_PARAMS: [ParamSpec; 15] = one_stage("ris");
-const TWO_STAGE_PARAMS: [ParamSpec; 16] = [
+const PCBPT_PARAMS: [ParamSpec; 17] = one_stage("balance");
+const RIS_PARAMS: [ParamSpec; 17] = one_stage("ris");
+const TWO_STAGE_PARAMS: [ParamSpec; 18] = [
     MAX_DEPTH,
     RR_DEPTH,
     KEEP,
@@ -136,6 +149,8 @@ const TWO_STAGE_PARAMS: [ParamSpec; 16] = [
     NEIGHBOURS,
     GROUPED_CACHES,
     METRIC,
+    TARGET,
+    PROPOSALS,
     EPSILON,
     DOUBT,
     TRUST,
@@ -144,6 +159,12 @@ const TWO_STAGE_PARAMS: [ParamSpec; 16] = [
 ];
 
 fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Integrator> {
+    let weights = match params.choice("weights") {
+        "balance" => Weights::Balance,
+        "ris" => Weights::OneStage,
+        _ => Weights::TwoStage,
+    };
+    let split = params.choice("proposals") == "split" && weights != Weights::Balance;
     let settings = Settings {
         scheme: Scheme::Caches,
         paths: params.int("paths") as u32,
@@ -154,12 +175,11 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
         epsilon: params.int("epsilon") as f32 * 1e-6,
         doubt: params.int("doubt") as f32 * 1e-6,
         trust: params.choice("trust") == "full",
-        metric: if params.choice("metric") == "plain" { Metric::Plain } else { Metric::Facing },
-        weights: match params.choice("weights") {
-            "balance" => Weights::Balance,
-            "ris" => Weights::OneStage,
-            _ => Weights::TwoStage,
-        },
+        // Which cache points are near a vertex must not depend on the side from which a technique looks at it.
+        metric: if params.choice("metric") == "plain" || split { Metric::Plain } else { Metric::Facing },
+        radiance: params.choice("target") == "radiance" && !split,
+        split,
+        weights,
     };
     let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
     this.weigher.eye_limits.keep = params.int("keep") as f32 * 0.01;
@@ -260,6 +280,10 @@ pub(in crate::integrators) struct Settings {
     pub trust: bool,
     /// Which cache points are near.
     pub metric: Metric,
+    /// Probabilities at cache points count the BSDF there.
+    pub radiance: bool,
+    /// Every proposal is a technique of its own.
+    pub split: bool,
     /// What weights know.
     pub weights: Weights,
 }

@@ -116,6 +116,15 @@ impl GroupPmf {
         ends.last().is_some_and(|&top| top > 0.0).then(|| Row { blocks: &self.cdf[at..at + blocks], ends })
     }
 
+    /// Entry `e`, drawn with the probability `p` among all entries.
+    #[inline]
+    fn choice(&self, e: usize, p: f32) -> Choice {
+        match self.entries.get(e) {
+            Some(entry) => Choice { vertex: entry.vertex as usize, probability: p / entry.stands_for },
+            None => Choice { vertex: e, probability: p },
+        }
+    }
+
     /// The first stage: draws one vertex of each cluster of a cut.
     fn draw_entries(
         &mut self,
@@ -147,7 +156,7 @@ impl GroupPmf {
         for e in 0..self.count {
             let entry = self.entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, stands_for: 1.0 });
             let y = store.vertex(entry.vertex as usize);
-            let (bsdf, end) = (store.bsdf(y), y.end());
+            let (bsdf, end) = (store.bsdf(entry.vertex as usize), y.end());
             let mut packet = SegmentPacket::default();
             let mut asked = [(0usize, 0.0f32); PACKET];
             for c in 0..group.len() {
@@ -166,7 +175,8 @@ impl GroupPmf {
             let seen = asked[..packet.len].iter().enumerate().filter(|(i, _)| blocked >> i & 1 == 0);
             let by = seen.clone().fold(0u16, |by, (_, (c, _))| by | 1 << c);
             for (_, &(c, brings)) in seen {
-                self.cdf[c * blocks + e / BLOCK].0[e % BLOCK] = brings;
+                self.cdf[c * blocks + e / BLOCK].0[e % BLOCK] = caches.aim(group.start + c, y.p, brings);
+                self.found[c][0] += f64::from(brings);
                 if caches.companions[group.start + c] & by == 0 {
                     self.found[c][2] += f64::from(brings);
                 }
@@ -174,7 +184,7 @@ impl GroupPmf {
         }
         if self.count > 0 {
             for (cdf, found) in self.cdf.chunks_exact_mut(blocks).zip(&mut self.found) {
-                found[0] = accumulate(cdf, self.count);
+                accumulate(cdf, self.count);
                 self.ends.extend(cdf.iter().map(|block| block.0[BLOCK - 1]));
                 *found = found.map(|sum| sum / f64::from(store.paths_traced));
             }
@@ -182,10 +192,9 @@ impl GroupPmf {
     }
 }
 
-/// Turns what the first `count` entries bring into cumulative probabilities, which end in exactly one; returns the sum.
-fn accumulate(blocks: &mut [Block], count: usize) -> f64 {
-    let all = || blocks.iter().flat_map(|b| b.0).take(count);
-    let sum: f64 = all().map(f64::from).sum();
+/// Turns what the first `count` entries bring into cumulative probabilities, which end in exactly one.
+fn accumulate(blocks: &mut [Block], count: usize) {
+    let sum: f64 = blocks.iter().flat_map(|b| b.0).take(count).map(f64::from).sum();
     if sum > 0.0 {
         let mut below = 0.0;
         for c in blocks.iter_mut().flat_map(|b| &mut b.0) {
@@ -193,7 +202,6 @@ fn accumulate(blocks: &mut [Block], count: usize) -> f64 {
             *c = (below / sum) as f32;
         }
     }
-    sum
 }
 
 impl Pmfs {
@@ -267,10 +275,26 @@ impl Pmfs {
         for row in &rows[..n] {
             p += share * row.map_or(uniform, |row| row.probability(e));
         }
-        Some(match group.entries.get(e) {
-            Some(entry) => Choice { vertex: entry.vertex as usize, probability: p / entry.stands_for },
-            None => Choice { vertex: e, probability: p },
-        })
+        Some(group.choice(e, p))
+    }
+
+    fn group(&self, cache: usize) -> Option<&GroupPmf> {
+        self.group_of.get(cache).map(|&g| &self.groups[g as usize])
+    }
+
+    /// Draws by the probabilities at one cache point alone; `None` if nothing is brought there.
+    pub fn draw_at(&self, cache: usize, u: f32) -> Option<Choice> {
+        let group = self.group(cache)?;
+        let row = group.row(cache)?;
+        let e = row.find(u).min(group.count - 1);
+        Some(group.choice(e, row.probability(e)))
+    }
+
+    /// Draws one of all entries of the cache point's group; `None` if there are none.
+    pub fn draw_uniformly(&self, cache: usize, u: f32) -> Option<Choice> {
+        let group = self.group(cache).filter(|group| group.count > 0)?;
+        let e = ((u * group.count as f32) as usize).min(group.count - 1);
+        Some(group.choice(e, 1.0 / group.count as f32))
     }
 }
 
@@ -290,8 +314,8 @@ mod tests {
             }
             blocks[0].0[0] = 0.5;
             let brought: Vec<f32> = blocks.iter().flat_map(|b| b.0).take(count).collect();
-            let sum = accumulate(&mut blocks, count);
-            assert!((sum - brought.iter().map(|&b| f64::from(b)).sum::<f64>()).abs() < 1e-9);
+            let sum: f64 = brought.iter().map(|&b| f64::from(b)).sum();
+            accumulate(&mut blocks, count);
             let ends: Vec<f32> = blocks.iter().map(|b| b.0[BLOCK - 1]).collect();
             let row = Row { blocks: &blocks, ends: &ends };
             let plain: Vec<f32> = (0..count).map(|e| row.cumulative(e)).collect();

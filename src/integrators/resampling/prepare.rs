@@ -93,7 +93,7 @@ impl Bidirectional {
         let Settings { second_stage, paths, .. } = resampler.settings;
         let mut store = std::mem::take(&mut resampler.store);
         let pieces = phases.time("light paths", || self.light_pass(iteration, paths, &mut store));
-        phases.time("light tree", || store.finish(second_stage.is_some()));
+        phases.time("light tree", || store.finish(paths, second_stage.is_some()));
         let Some(resampler) = &mut self.resampler else { return (stats, pieces) };
         resampler.store = store;
         if let Some(sites) = &resampler.sites {

@@ -4,13 +4,18 @@ use super::caches::Caches;
 use super::combined::CombinedPmfs;
 use super::pmfs::{Choice, Pmfs};
 use super::sites::Sites;
+use super::split::Near;
 use super::store::LightStore;
 use super::{Scheme, Settings, Weights};
 use crate::integrators::bdpt::eye_path::Candidate;
 use crate::math::Vec3;
 use crate::math::hash::HashRng;
+use crate::mis::definition::Joined;
 use crate::mis::{Resampled, There};
-use crate::shade::SurfacePoint;
+use crate::prepared::PreparedScene;
+use crate::ray::Tracer;
+use crate::ray::offset::SegmentEnd;
+use crate::shade::{SurfacePoint, Transport};
 use crate::spatial::nearest::MOST;
 
 /// The candidates of an iteration and how to draw from them.
@@ -56,9 +61,24 @@ impl Resampler {
     #[inline]
     pub fn there(&self, point: &SurfacePoint, d: Vec3) -> There {
         match &self.caches {
-            Some(caches) if self.settings.weights != Weights::Balance => caches.there(point.p, side(point, d)),
+            Some(caches) if self.settings.weights != Weights::Balance && !self.settings.split => {
+                caches.there(point.p, side(point, d))
+            }
             _ => There::default(),
         }
+    }
+
+    /// c of a connection by its definition.
+    pub fn factor_of(&self, scene: &PreparedScene, resampled: &Resampled, joined: &Joined) -> f32 {
+        let Joined { y, from, z, to, distance2, arriving, brings } = joined;
+        if !resampled.split {
+            return resampled.factor(*brings, *distance2, self.there(&z.point, -*to));
+        }
+        let near = self.near(z.point.p, z.point.ng);
+        let end = SegmentEnd::Surface { p: y.point.p, error: y.point.error, ng: y.point.ng };
+        let seen = self.seen_by(&near, &end, &mut Tracer::new(&*scene.query));
+        let value = |to: Vec3| y.bsdf.eval(*from, to, Transport::Importance);
+        resampled.shares(*arriving, &self.proposals(&near, (y.point.p, y.point.ng), seen, value)).sum()
     }
 
     /// What weights know.
@@ -77,6 +97,7 @@ impl Resampler {
             doubt: self.settings.doubt,
             uniform: 1.0 / (self.settings.neighbours + 1) as f32,
             vertices_per_path: if paths > 0 { (vertices as f64 / paths as f64) as f32 } else { 0.0 },
+            split: self.settings.split,
         })
     }
 
@@ -94,19 +115,12 @@ impl Resampler {
         if self.store.is_empty() {
             return;
         }
-        let (mut found, most) = ([0; MOST], self.settings.neighbours);
         if matches!(self.settings.scheme, Scheme::Caches) {
-            let mut count = 0;
-            if let Some(caches) = &self.caches {
-                for i in caches.index.find(point.p, side(point, wo)).take(most) {
-                    found[count] = i;
-                    count += 1;
-                }
-            }
+            let near = self.near(point.p, side(point, wo));
             for _ in 0..self.settings.samples {
                 let u = rng.next_4();
                 if u[2] < effort
-                    && let Some(candidate) = self.draw(&found[..count], [u[0], u[1]], effort)
+                    && let Some(candidate) = self.draw(&near, [u[0], u[1]], effort)
                     && possible(candidate.vertex.length())
                 {
                     connect(candidate);
@@ -114,6 +128,7 @@ impl Resampler {
             }
             return;
         }
+        let (mut found, most) = ([0; MOST], self.settings.neighbours);
         let Some(sites) = &self.sites else { return };
         let count = sites.find(point.p, side(point, wo), most, &mut found);
         for class in 0..self.combined.classes() {
@@ -147,17 +162,18 @@ impl Resampler {
 
     /// Draws a candidate by the cache points `near`; `None` if there are none. Only a share `effort` of draws is made.
     #[inline]
-    fn draw(&self, near: &[usize], u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
-        let Choice { vertex, probability } = match near {
-            [] => self.draw_anything(u[1])?,
-            _ => self.pmfs.draw(near, u)?,
+    fn draw(&self, near: &Near, u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
+        let (proposal, Choice { vertex, probability }) = match near.caches() {
+            _ if self.settings.split => self.draw_split(near, u).map(|(proposal, choice)| (Some(proposal), choice))?,
+            [] => (None, self.draw_anything(u[1])?),
+            caches => (None, self.pmfs.draw(caches, u)?),
         };
         let scale = 1.0 / (probability * self.settings.paths as f32 * self.settings.samples as f32 * effort);
-        Some(self.store.candidate(vertex, scale))
+        Some(Candidate { proposal, ..self.store.candidate(vertex, scale) })
     }
 
     /// Far from all cache points: uniformly or, as a first stage would, by f_y/p.
-    fn draw_anything(&self, u: f32) -> Option<Choice> {
+    pub(super) fn draw_anything(&self, u: f32) -> Option<Choice> {
         let all = self.store.len();
         if self.settings.second_stage.is_none() {
             let vertex = ((u * all as f32) as usize).min(all - 1);

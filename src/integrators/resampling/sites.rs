@@ -40,7 +40,7 @@ enum Finder {
 impl Sites {
     /// Records: the vertices of `fraction` times as many eye sub-paths as the picture has pixels.
     pub fn records(scene: &PreparedScene, seed: u64, fraction: f64, limits: &Limits) -> (Sites, RayStats) {
-        let (mut all, stats) = place(scene, seed, fraction, limits);
+        let (mut all, _, stats) = place(scene, seed, fraction, limits);
         let positions: Vec<Vec3> = all.iter().map(|c| c.p).collect();
         all = morton::order(&positions).into_iter().map(|i| all[i as usize]).collect();
         let normals: Vec<Vec3> = all.iter().map(|c| c.side).collect();
@@ -59,7 +59,7 @@ impl Sites {
     ) -> (Sites, RayStats) {
         let skeleton = Box::new(Skeleton::of_scene(scene, cells));
         let pixels = f64::from(scene.film_size[0]) * f64::from(scene.film_size[1]);
-        let (vertices, stats) = place(scene, seed, COUNTED / pixels, limits);
+        let (vertices, _, stats) = place(scene, seed, COUNTED / pixels, limits);
         let mut mapped = vec![0u32; skeleton.nodes.len()];
         for v in &vertices {
             if let Some(node) = skeleton.node_of(v.p, v.side) {

@@ -24,14 +24,20 @@ const AT_ONCE: u32 = 64;
 pub(in crate::integrators) struct LightStore {
     /// M, with those that ended at once.
     pub paths_traced: u32,
-    nodes: Vec<Node>,
-    /// When finished, in an order that keeps neighbours together.
+    /// As they were traced. The memory of one iteration is the next one's.
+    parts: Vec<Part>,
+    /// When finished, all vertices in an order that keeps neighbours together.
     vertices: Vec<StoredVertex>,
-    /// The same before that: kept for its memory.
-    unsorted: Vec<StoredVertex>,
-    bsdfs: BsdfPool,
     /// Tree over the vertices, weighed by the luminance of f_y/p.
     pub tree: PointTree,
+}
+
+/// The light sub-paths of one piece of work.
+#[derive(Debug, Default)]
+pub(in crate::integrators) struct Part {
+    nodes: Vec<Node>,
+    vertices: Vec<StoredVertex>,
+    bsdfs: BsdfPool,
 }
 
 /// A vertex, and what is to be known of the sub-path it ends: all that a connection reads but the densities.
@@ -43,23 +49,28 @@ struct StoredVertex {
     /// The first of its densities.
     first_node: u32,
     next_event: f32,
+    /// The part that has its densities and its BSDF.
+    part: u16,
     light_can_be_hit: bool,
+}
+
+/// Unit direction from `from` to a surface at `p` on the side `n`, and |cos| / distance² there; none if it arrives from below.
+#[inline]
+pub(super) fn direction_to(from: Vec3, p: Vec3, n: Vec3) -> Option<(Vec3, f32)> {
+    let to = p - from;
+    let dist2 = to.length_squared();
+    let towards = to * (1.0 / dist2.sqrt());
+    let cos = -n.dot(towards);
+    // A point has no direction to itself: not a number, and not above the horizon.
+    (cos > 0.0).then_some((towards, cos / dist2))
 }
 
 impl LightVertex {
     /// What the sub-path that ends here, where the BSDF is `bsdf`, brings to a surface at `p` on the side `n`, as if nothing were in the way: q̂₂/p and q̂₁/p.
     #[inline]
     pub fn brings(&self, bsdf: &BsdfRef, p: Vec3, n: Vec3) -> Targets {
-        let to = p - self.p;
-        let dist2 = to.length_squared();
-        let towards = to * (1.0 / dist2.sqrt());
-        let cos = -n.dot(towards);
-        // A point on the light vertex itself has no direction to it: not a number, and not above its horizon.
-        if cos.is_nan() || cos <= 0.0 {
-            return Targets::default();
-        }
+        let Some((towards, spread)) = direction_to(self.p, p, n) else { return Targets::default() };
         let value = bsdf.eval(self.wo, towards, Transport::Importance);
-        let spread = cos / dist2;
         let targets = Targets {
             scattered: (self.throughput * value).luminance() * spread,
             unscattered: self.throughput.luminance() * self.ng.dot(towards).abs() * spread,
@@ -78,27 +89,23 @@ impl LightStore {
     ) -> (LightStore, RayStats) {
         let scene = iteration.scene;
         let stream = WARM_UP_STREAM | set << 32;
-        let pieces: Vec<(LightStore, RayStats)> = (0..paths.div_ceil(AT_ONCE))
-            .into_par_iter()
-            .map(|piece| {
-                let (mut tracer, mut path) = (Tracer::new(&*scene.query), LightPath::default());
-                let mut store = LightStore::default();
-                for number in piece * AT_ONCE..paths.min((piece + 1) * AT_ONCE) {
-                    let mut sampler = PathSampler::new(iteration.seed, stream, iteration.index, u64::from(number));
-                    light_path::trace(this, scene, &mut sampler, &mut tracer, &mut path, None, None, true);
-                    store.keep(number, &path);
-                }
-                (store, tracer.stats)
-            })
-            .collect();
         let mut store = LightStore::default();
-        let mut stats = RayStats::default();
-        for (piece, s) in pieces {
-            store.append(&piece);
-            stats.merge(&s);
-        }
-        store.finish(with_tree);
-        (store, stats)
+        let trace_part = |(number, part): (usize, &mut Part)| {
+            let (mut tracer, mut path) = (Tracer::new(&*scene.query), LightPath::default());
+            let first = number as u32 * AT_ONCE;
+            for number in first..paths.min(first + AT_ONCE) {
+                let mut sampler = PathSampler::new(iteration.seed, stream, iteration.index, u64::from(number));
+                light_path::trace(this, scene, &mut sampler, &mut tracer, &mut path, None, None, true);
+                part.keep(number, &path);
+            }
+            tracer.stats
+        };
+        let stats: Vec<RayStats> =
+            store.begin(paths.div_ceil(AT_ONCE)).par_iter_mut().enumerate().map(trace_part).collect();
+        store.finish(paths, with_tree);
+        let mut all = RayStats::default();
+        stats.iter().for_each(|s| all.merge(s));
+        (store, all)
     }
 
     /// The surface vertices of sub-path `number` of the iteration, written down, and its origin.
@@ -111,63 +118,39 @@ impl LightStore {
         (replay.light, path.origin)
     }
 
-    /// Takes in sub-path `number`.
-    pub fn keep(&mut self, number: u32, path: &LightPath) {
-        self.paths_traced += 1;
-        if path.vertices.is_empty() {
-            return;
-        }
-        let first_node = self.nodes.len() as u32;
-        self.nodes.extend_from_slice(path.side.nodes());
-        let bsdfs = &mut self.bsdfs;
-        self.vertices.extend(path.vertices.iter().map(|v| StoredVertex {
-            vertex: LightVertex { bsdf: bsdfs.keep_from(&v.bsdf, &path.bsdfs), ..*v },
-            number,
-            first_node,
-            next_event: path.next_event,
-            light_can_be_hit: path.light_can_be_hit,
-        }));
-    }
-
-    /// Takes in everything of `other`.
-    pub fn append(&mut self, other: &LightStore) {
-        let first_node = self.nodes.len() as u32;
-        self.paths_traced += other.paths_traced;
-        self.nodes.extend_from_slice(&other.nodes);
-        let moved = self.bsdfs.append(&other.bsdfs);
-        self.vertices.extend(other.vertices.iter().map(|v| {
-            let vertex = LightVertex { bsdf: v.vertex.bsdf.moved(moved), ..v.vertex };
-            StoredVertex { vertex, first_node: v.first_node + first_node, ..*v }
-        }));
-    }
-
-    /// Puts the vertices in order, when all are there, and builds the tree over them if a first stage wants it.
-    pub fn finish(&mut self, with_tree: bool) {
-        let positions: Vec<Vec3> = self.vertices.iter().map(|v| v.vertex.p).collect();
-        let order = morton::order(&positions);
-        // The memory of the last iteration takes the vertices of this one.
-        std::mem::swap(&mut self.vertices, &mut self.unsorted);
-        let unsorted = &self.unsorted;
-        order.par_iter().map(|&i| unsorted[i as usize]).collect_into_vec(&mut self.vertices);
-        if !with_tree {
-            return;
-        }
-        let sorted: Vec<Vec3> = order.iter().map(|&i| positions[i as usize]).collect();
-        self.tree.build(
-            &sorted,
-            self.vertices.iter().map(|v| {
-                let weight = v.vertex.throughput.luminance();
-                if weight.is_finite() { weight } else { 0.0 }
-            }),
-        );
-    }
-
-    /// Forgets everything but its memory.
-    pub fn clear(&mut self) {
-        self.paths_traced = 0;
-        self.nodes.clear();
+    /// Forgets everything but its memory; what there will be comes into so many parts.
+    pub fn begin(&mut self, parts: u32) -> &mut [Part] {
         self.vertices.clear();
-        self.bsdfs.clear();
+        self.parts.resize_with(parts as usize, Part::default);
+        self.parts.iter_mut().for_each(Part::clear);
+        &mut self.parts
+    }
+
+    /// Puts the vertices of all `paths` sub-paths in order, and builds the tree over them if a first stage wants it.
+    pub fn finish(&mut self, paths: u32, with_tree: bool) {
+        self.paths_traced = paths;
+        let parts = &self.parts;
+        let of_part = |(number, part): (usize, &'_ Part)| {
+            let vertices = part.vertices.iter().enumerate();
+            vertices.map(move |(i, v)| (v.vertex.p, (number as u16, i as u32))).collect::<Vec<_>>()
+        };
+        let (positions, places): (Vec<Vec3>, Vec<(u16, u32)>) =
+            parts.par_iter().enumerate().flat_map_iter(of_part).unzip();
+        let order = morton::sorted(&positions);
+        let of_place = |&(_, i): &(u32, u32)| {
+            let (part, i) = places[i as usize];
+            StoredVertex { part, ..parts[usize::from(part)].vertices[i as usize] }
+        };
+        order.par_iter().map(of_place).collect_into_vec(&mut self.vertices);
+        if with_tree {
+            let codes: Vec<u32> = order.par_iter().map(|&(code, _)| code).collect();
+            let weighed = |v: &StoredVertex| {
+                let weight = v.vertex.throughput.luminance();
+                (v.vertex.p, if weight.is_finite() { weight } else { 0.0 })
+            };
+            let points: Vec<(Vec3, f32)> = self.vertices.par_iter().map(weighed).collect();
+            self.tree.build(&codes, &points);
+        }
     }
 
     /// Number of vertices.
@@ -194,25 +177,53 @@ impl LightStore {
         &self.vertices[v].vertex
     }
 
-    /// The BSDF of one of its vertices.
+    /// The BSDF of a vertex, by its place in the order.
     #[inline]
-    pub fn bsdf(&self, vertex: &LightVertex) -> BsdfRef<'_> {
-        self.bsdfs.get(&vertex.bsdf, vertex.ng)
+    pub fn bsdf(&self, v: usize) -> BsdfRef<'_> {
+        let StoredVertex { vertex, part, .. } = &self.vertices[v];
+        self.parts[usize::from(*part)].bsdfs.get(&vertex.bsdf, vertex.ng)
     }
 
     /// The sub-path that ends in vertex `v`, as a candidate for a connection that counts `scale` times.
     #[inline]
     pub fn candidate(&self, v: usize, scale: f32) -> Candidate<'_> {
-        let StoredVertex { vertex, number, first_node, next_event, light_can_be_hit } = &self.vertices[v];
+        let StoredVertex { vertex, number, first_node, next_event, part, light_can_be_hit } = &self.vertices[v];
         Candidate {
             vertex,
-            bsdf: self.bsdf(vertex),
-            nodes: &self.nodes[*first_node as usize..][..vertex.length()],
+            bsdf: self.bsdf(v),
+            nodes: &self.parts[usize::from(*part)].nodes[*first_node as usize..][..vertex.length()],
             next_event: *next_event,
             light_can_be_hit: *light_can_be_hit,
             origin: None,
             number: Some(*number),
+            proposal: None,
             scale,
         }
+    }
+}
+
+impl Part {
+    fn clear(&mut self) {
+        self.nodes.clear();
+        self.vertices.clear();
+        self.bsdfs.clear();
+    }
+
+    /// Takes in sub-path `number`.
+    pub fn keep(&mut self, number: u32, path: &LightPath) {
+        if path.vertices.is_empty() {
+            return;
+        }
+        let first_node = self.nodes.len() as u32;
+        self.nodes.extend_from_slice(path.side.nodes());
+        let bsdfs = &mut self.bsdfs;
+        self.vertices.extend(path.vertices.iter().map(|v| StoredVertex {
+            vertex: LightVertex { bsdf: bsdfs.keep_from(&v.bsdf, &path.bsdfs), ..*v },
+            number,
+            first_node,
+            next_event: path.next_event,
+            part: 0,
+            light_can_be_hit: path.light_can_be_hit,
+        }));
     }
 }

@@ -1,0 +1,100 @@
+//! Proposals as techniques of their own: which cache points are near an eye vertex, how a light vertex sees them, and how one is drawn by.
+//!
+//! See `mis::proposals` for what weights make of it. All of a path's proposals must be functions of the path alone, so the shadow rays between
+//! cache points and vertices are traced at once and not queued.
+
+use super::caches::Caches;
+use super::pmfs::Choice;
+use super::resampler::Resampler;
+use super::store::direction_to;
+use crate::integrators::bdpt::light_path::LightVertex;
+use crate::math::{Rgb, Vec3};
+use crate::mis::{Proposal, Proposals};
+use crate::ray::offset::{SegmentEnd, segment};
+use crate::ray::{RayKind, SegmentPacket, Tracer};
+use crate::shade::{BsdfRef, Transport};
+use crate::spatial::nearest::MOST;
+
+/// The cache points near a place.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::integrators) struct Near {
+    count: usize,
+    caches: [usize; MOST],
+}
+
+impl Near {
+    /// These.
+    pub(super) fn caches(&self) -> &[usize] {
+        &self.caches[..self.count]
+    }
+}
+
+impl Resampler {
+    /// The cache points near the place `p` on the side `n` of a surface.
+    #[inline]
+    pub fn near(&self, p: Vec3, n: Vec3) -> Near {
+        let mut near = Near::default();
+        if let Some(caches) = &self.caches {
+            for i in caches.index.find(p, n).take(self.settings.neighbours) {
+                near.caches[near.count] = i;
+                near.count += 1;
+            }
+        }
+        near
+    }
+
+    /// Bit `i` set: nothing is between cache point `i` of `near` and the vertex whose end of a shadow ray is `y`. These are the rays that
+    /// the cache points' probabilities know.
+    pub fn seen_by(&self, near: &Near, y: &SegmentEnd, tracer: &mut Tracer) -> u16 {
+        let Some(caches) = self.caches.as_ref().filter(|_| near.count > 0) else { return 0 };
+        let mut packet = SegmentPacket::default();
+        near.caches().iter().for_each(|&c| packet.push(&segment(caches.end(c), y)));
+        !tracer.occluded_packet(&packet, RayKind::ShadowWeight)
+    }
+
+    /// The cache points `near` as seen from the vertex at `p` with the geometric normal `ng`, whose value for the direction to one is `value`
+    /// and of which those with a bit in `seen` see it.
+    pub fn proposals(&self, near: &Near, (p, ng): (Vec3, Vec3), seen: u16, value: impl Fn(Vec3) -> Rgb) -> Proposals {
+        let Some(caches) = &self.caches else { return Proposals::default() };
+        let mut proposals = Proposals { count: near.count, ..Proposals::default() };
+        for (i, (proposal, &cache)) in proposals.each.iter_mut().zip(near.caches()).enumerate() {
+            proposal.all = caches.all(cache);
+            if let Some((towards, spread)) = caches.towards(cache, p) {
+                let scattered = if seen >> i & 1 == 1 { value(towards) * spread } else { Rgb::BLACK };
+                let unscattered = ng.dot(towards).abs() * spread;
+                if scattered.luminance().is_finite() && unscattered.is_finite() {
+                    *proposal = Proposal { scattered, unscattered, ..*proposal };
+                }
+            }
+        }
+        proposals
+    }
+
+    /// The cache points `near` as seen from the light vertex `y`, whose BSDF is `bsdf`.
+    pub fn proposals_of(&self, near: &Near, y: &LightVertex, bsdf: &BsdfRef, tracer: &mut Tracer) -> Proposals {
+        let seen = self.seen_by(near, &y.end(), tracer);
+        self.proposals(near, (y.p, y.ng), seen, |to| bsdf.eval(y.wo, to, Transport::Importance))
+    }
+
+    /// Chooses a proposal, one of the cache points `near` or the virtual one, and draws by it alone: the number of the proposal, and what was
+    /// drawn with what probability, the choice of the proposal included. `None` where there is nothing to draw.
+    pub(super) fn draw_split(&self, near: &Near, u: [f32; 2]) -> Option<(usize, Choice)> {
+        let n = near.count;
+        let proposal = ((u[0] * (n + 1) as f32) as usize).min(n);
+        let choice = match near.caches().get(proposal) {
+            Some(&cache) => self.pmfs.draw_at(cache, u[1])?,
+            None => match near.caches().first() {
+                Some(&cache) => self.pmfs.draw_uniformly(cache, u[1])?,
+                None => self.draw_anything(u[1])?,
+            },
+        };
+        Some((proposal, Choice { probability: choice.probability / (n + 1) as f32, ..choice }))
+    }
+}
+
+impl Caches {
+    /// Unit direction from `p` to a cache point, and |cos| / distance² there; none if it is not in front of it.
+    fn towards(&self, cache: usize, p: Vec3) -> Option<(Vec3, f32)> {
+        direction_to(p, self.index.points()[cache], self.index.normals()[cache])
+    }
+}
