@@ -16,7 +16,7 @@ const SPP: u64 = 32;
 #[test]
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
-    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 22] = [
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 24] = [
         (ris, &[("paths", "1")]),
         (ris, &[("paths", "2"), ("neighbours", "1")]),
         (ris, &[("paths", "200"), ("neighbours", "0")]),
@@ -27,6 +27,8 @@ fn parameters_do_not_change_the_expectation() {
         (ris, &[("proposals", "split"), ("neighbours", "1"), ("samples", "2")]),
         (two, &[("proposals", "split"), ("second_stage", "8"), ("doubt", "0"), ("keep", "100"), ("skip", "never")]),
         (two, &[("proposals", "split"), ("paths", "100"), ("second_stage", "100"), ("neighbours", "0")]),
+        (two, &[("proposals", "asked"), ("second_stage", "16")]),
+        (ris, &[("proposals", "asked"), ("neighbours", "2"), ("paths", "20")]),
         (two, &[("target", "radiance"), ("metric", "plain")]),
         (ris, &[("epsilon", "1000000"), ("doubt", "1000000")]),
         (two, &[("second_stage", "1")]),

@@ -82,7 +82,7 @@ fn resampling_aware_weights_are_those_of_the_definition() {
             let paths = ["200", "7", "1"][i % 3];
             // A film of 64 pixels needs more than its share of cache points.
             let params = [
-                ("proposals", ["mixture", "split"][(i / 2) % 2]),
+                ("proposals", ["mixture", "split", "asked"][(i + i / 3) % 3]),
                 ("techniques", techniques),
                 ("rr_depth", roulette),
                 ("paths", paths),

@@ -19,7 +19,7 @@ pub mod weigh;
 
 pub use effort::{Costs, Effort, EffortStatistics};
 pub use proposals::{Proposal, Proposals, Shares};
-pub use resampled::{Resampled, Targets, There};
+pub use resampled::{Form, Resampled, Targets, There};
 pub use side::{Lit, Node, Side, next_event, spread};
 pub use techniques::{Techniques, TechniquesError};
 pub use weigh::{Joint, Split, Weigher, Weight};

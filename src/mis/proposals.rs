@@ -1,6 +1,6 @@
-//! The factor c of a connection whose proposals are techniques of their own, as published.
+//! The factor c of a connection where weights ask cache points what these can draw.
 //!
-//! An eye vertex chooses one of its n nearest cache points or a *virtual* one, each with probability 1/(n + 1), and draws a light sub-path
+//! *Split*, as published: an eye vertex chooses one of its n nearest cache points or a *virtual* one, each with probability 1/(n + 1), and draws a light sub-path
 //! by that one's probabilities alone; the virtual one draws uniformly (Nabata et al. 2020, "Resampling-aware weighting functions",
 //! §5.2). Proposal i then aims at q̂_i, the light that the sub-path brings to cache point i, what is in the way included, and has the factor
 //!
@@ -10,11 +10,12 @@
 //! way. The virtual one has q = p/L where L vertices per sub-path are drawn from alike; with two stages it draws from what the first left,
 //! whose density is the cache points' mean q₁.
 //!
-//! Unlike the factor of a mixture ([`Resampled::factor`]) this one needs shadow rays from every cache point, for every technique of every
-//! path; it knows in return exactly which sub-paths each cache point can draw.
+//! *Asked*: the proposals are one mixture, Σ_i P_i/(n + 1), whose density is q = Σ_i q_i/(n + 1); c is that of one such proposal.
+//!
+//! Unlike the factor that only assumes ([`Resampled::factor`]) these need shadow rays from every cache point, for every technique of
+//! every path; they know in return exactly which sub-paths each cache point can draw.
 
-use super::Resampled;
-use super::resampled::Targets;
+use super::resampled::{Form, Resampled, Targets};
 use crate::math::Rgb;
 use crate::spatial::nearest::MOST;
 
@@ -63,6 +64,33 @@ impl Shares {
 }
 
 impl Resampled {
+    /// c of a connection to a light vertex at which the light β_L = `arriving` is.
+    pub fn factor_of(&self, arriving: Rgb, proposals: &Proposals) -> f32 {
+        if self.form == Form::Split {
+            return self.shares(arriving, proposals).sum();
+        }
+        let near = &proposals.each[..proposals.count];
+        let p_over = |q_over_p: f32| (1.0 / q_over_p).clamp(self.epsilon, f32::MAX);
+        let sum = |of: &dyn Fn(&Proposal) -> f32| near.iter().map(of).sum::<f32>();
+        let all = sum(&|p| p.all.unscattered);
+        let uniform = match self.second_stage {
+            Some(_) if all > 0.0 => arriving.luminance() * sum(&|p| p.unscattered) / all,
+            _ => 1.0 / self.vertices_per_path,
+        };
+        // Where a cache point knows of no light, its share of the mixture is uniform, too.
+        let known = |p: &Proposal| match p.all.scattered > 0.0 {
+            true => (arriving * p.scattered).luminance() / p.all.scattered,
+            false => uniform,
+        };
+        let last = p_over((sum(&known) + uniform) / (near.len() + 1) as f32);
+        let m = 1.0 / self.paths;
+        let p_over_q = match self.second_stage {
+            None => last,
+            Some(m2) => p_over(uniform) / m2 + (1.0 - 1.0 / m2) * last,
+        };
+        1.0 / (m + (1.0 - m) * p_over_q)
+    }
+
     /// Factors of the proposals of a connection to a light vertex at which the light β_L = `arriving` is.
     pub fn shares(&self, arriving: Rgb, proposals: &Proposals) -> Shares {
         let near = &proposals.each[..proposals.count];
@@ -104,7 +132,7 @@ mod tests {
         doubt: 0.0,
         uniform: 0.25,
         vertices_per_path: 3.0,
-        split: true,
+        form: Form::Split,
     };
 
     fn near(scattered: [f32; MOST]) -> Proposals {
@@ -122,6 +150,19 @@ mod tests {
         // p/q = 2/12 at the first.
         assert!((shares.of(0) - 0.25 / (0.005 + 0.995 / 6.0)).abs() < 1e-6);
         assert!((shares.sum() - (0..4).map(|i| shares.of(i)).sum::<f32>()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_density_of_a_mixture_is_the_mean() {
+        let asked = Resampled { form: Form::Asked, ..RESAMPLED };
+        // Of three cache points one does not see the vertex.
+        let q = (12.0 / 2.0 + 0.0 + 3.0 / 2.0 + 1.0 / 3.0) / 4.0;
+        let c = asked.factor_of(Rgb::grey(3.0), &near([4.0, 0.0, 1.0]));
+        assert!((c - 1.0 / (0.005 + 0.995 / q)).abs() < 1e-5);
+        let c = Resampled { second_stage: Some(1e9), ..asked }.factor_of(Rgb::grey(3.0), &near([4.0, 0.0, 1.0]));
+        let q = (12.0 / 2.0 + 0.0 + 3.0 / 2.0 + 4.5 / 5.0) / 4.0;
+        assert!((c - 1.0 / (0.005 + 0.995 / q)).abs() < 1e-5);
+        assert_eq!(Resampled { paths: 1.0, ..asked }.factor_of(Rgb::WHITE, &near([0.0; MOST])), 1.0);
     }
 
     #[test]

@@ -66,8 +66,28 @@ pub struct Resampled {
     pub uniform: f32,
     /// L, an estimate; 0 if nothing is known yet.
     pub vertices_per_path: f32,
-    /// Proposals are techniques of their own, see `mis::proposals`, and not parts of one mixture.
-    pub split: bool,
+    /// What is one technique, and what weights know of cache points.
+    pub form: Form,
+}
+
+/// What is one technique, and what weights know of the cache points that it draws by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// All proposals are one mixture, of which weights assume that its cache points are where the eye vertex is; see
+    /// [`Resampled::factor`].
+    Mixture,
+    /// All proposals are one mixture, and weights ask its cache points; see `mis::proposals`.
+    Asked,
+    /// Proposals are techniques of their own, and weights ask the cache points; see `mis::proposals`.
+    Split,
+}
+
+impl Form {
+    /// Weights ask the cache points.
+    #[inline]
+    pub fn asks(self) -> bool {
+        self != Form::Mixture
+    }
 }
 
 impl Resampled {
@@ -117,7 +137,7 @@ mod tests {
         doubt: 0.0,
         uniform: 0.25,
         vertices_per_path: 3.0,
-        split: false,
+        form: Form::Mixture,
     };
 
     fn lit(scattered: f32) -> Targets {

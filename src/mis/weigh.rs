@@ -177,10 +177,10 @@ impl Weigher {
         if n < 2 {
             return 1.0;
         }
-        if resampled.split {
+        if resampled.form.asks() {
             let proposals =
                 path.eye_proposals.and_then(|(others, last)| if n + 1 == t { Some(last) } else { others.get(n) });
-            return resampled.shares(before, proposals.unwrap_or(&Proposals::NONE)).sum();
+            return resampled.factor_of(before, proposals.unwrap_or(&Proposals::NONE));
         }
         resampled.factor(brings, lit.distance2, path.eye_lit[n - 1].there)
     }

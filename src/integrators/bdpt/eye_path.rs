@@ -56,6 +56,8 @@ pub(in crate::integrators) struct Candidate<'a> {
     pub number: Option<u32>,
     /// The proposal that drew it, where each is a technique of its own.
     pub proposal: Option<usize>,
+    /// The cache points near the eye vertex it was drawn for, and which of them see it, where weights ask for them.
+    pub near: (Near, u16),
     /// One over the expected number of times that this sub-path is drawn for one of its kind.
     pub scale: f32,
 }
@@ -72,6 +74,7 @@ impl<'a> Candidate<'a> {
             origin: path.origin,
             number: None,
             proposal: None,
+            near: Default::default(),
             scale,
         }
     }
@@ -169,7 +172,7 @@ impl EyeHooks<'_, '_> {
             light_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
             eye: self.side.nodes(),
             eye_lit: self.side.lit(),
-            eye_proposals: self.split().map(|_| (self.side.proposals(), &NO_PROPOSALS)),
+            eye_proposals: self.asks().map(|_| (self.side.proposals(), &NO_PROPOSALS)),
             eye_joint: Joint { arrival: origin, departure },
             next_event,
             light_can_be_hit: true,
@@ -238,12 +241,13 @@ impl EyeHooks<'_, '_> {
         let (near, seen) = &self.near_before;
         let value = |to: Vec3| vertex.bsdf.eval(from, to, Transport::Importance);
         let at = (vertex.point.p, vertex.point.ng);
-        self.split().map(|resampler| resampler.proposals(near, at, *seen, value))
+        self.asks().map(|resampler| resampler.proposals(near, at, *seen, value))
     }
 
-    /// The resampler, if its proposals are techniques of their own.
-    fn split(&self) -> Option<&Resampler> {
-        self.this.resampler.as_ref().filter(|resampler| resampler.settings.split)
+    /// The resampler, if weights ask cache points.
+    #[inline]
+    fn asks(&self) -> Option<&Resampler> {
+        self.this.resampler.as_ref().filter(|resampler| resampler.settings.form.asks())
     }
 
     fn direct_weight(
@@ -319,13 +323,15 @@ impl EyeHooks<'_, '_> {
         let arriving = scattered * (1.0 / light_pdf);
         let spread_z = spread(z.ng.dot(to_light), dist2);
         let factor = weigher.resampled.map_or(1.0, |resampled| {
-            if let (Some(proposal), Some(resampler)) = (to.proposal, &self.this.resampler) {
-                let near = resampler.near(z.p, z.ng);
-                let proposals = resampler.proposals_of(&near, light, &to.bsdf, tracer);
-                let shares = resampled.shares(light.throughput, &proposals);
+            if let Some(resampler) = self.asks() {
+                let (near, seen) = &to.near;
+                let proposals = resampler.proposals_of(near, light, &to.bsdf, *seen);
                 // Of what all proposals make of the path, this one makes its share.
-                raw *= shares.of(proposal) / shares.sum();
-                return shares.sum();
+                if let Some(proposal) = to.proposal {
+                    let shares = resampled.shares(light.throughput, &proposals);
+                    raw *= shares.of(proposal) / shares.sum();
+                }
+                return resampled.factor_of(light.throughput, &proposals);
             }
             let brings = Targets {
                 scattered: scattered.luminance() * spread_z,
@@ -379,7 +385,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
             return false;
         }
         if vertex.index > 1
-            && let Some(resampler) = self.split()
+            && let Some(resampler) = self.asks()
         {
             let end = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
             self.near_before.1 = resampler.seen_by(&self.near_before.0, &end, tracer);
@@ -427,8 +433,8 @@ impl WalkHooks for EyeHooks<'_, '_> {
                 (lit.there, lit.adjoint, lit.reverse) = (there, value, reverse.0);
             }
         }
-        if let Some(resampler) = self.split() {
-            let near = resampler.near(vertex.point.p, vertex.point.ng);
+        if let Some(resampler) = self.asks() {
+            let near = resampler.near(vertex.point, sample.wi);
             if vertex.index > 1
                 && !sample.delta
                 && let Some(proposals) = self.proposals_before(vertex, sample.wi)

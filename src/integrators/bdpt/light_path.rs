@@ -97,8 +97,8 @@ pub(in crate::integrators) fn trace(
     out.light_can_be_hit = !light.is_delta();
     let flux = emission.flux() * (1.0 / chosen.0);
     out.origin = Some(Origin { light: id, end: emission.end, leaving: emission.direction, flux });
-    // Proposals that are techniques of their own are asked from the vertex before.
-    let keep = keep || this.resampler.as_ref().is_some_and(|r| r.settings.split);
+    // Cache points near a vertex are asked about the vertex before.
+    let keep = keep || this.resampler.as_ref().is_some_and(|r| r.settings.form.asks());
     let mut hooks =
         LightHooks { this, scene, id, chosen, emission: &emission, luminance_before: 0.0, out, lens, record, keep };
     hooks.emitter_to_lens([v[2], v[3]], tracer, sampler);
@@ -291,13 +291,14 @@ impl LightHooks<'_, '_> {
             return 1.0;
         };
         let (point, distance) = (vertex.point, vertex.edge.distance);
-        if resampled.split {
-            let near = resampler.near(point.p, point.ng);
+        if resampled.form.asks() {
+            let near = resampler.near(point, vertex.wo);
             // A vertex that cannot be connected to was not kept, and has no proposals.
             let before = self.out.vertices.last().filter(|y| y.s == vertex.index);
             return before.map_or(1.0, |y| {
                 let bsdf = self.out.bsdfs.get(&y.bsdf, y.ng);
-                resampled.shares(y.throughput, &resampler.proposals_of(&near, y, &bsdf, tracer)).sum()
+                let seen = resampler.seen_by(&near, &y.end(), tracer);
+                resampled.factor_of(y.throughput, &resampler.proposals_of(&near, y, &bsdf, seen))
             });
         }
         let dist2 = distance * distance;

@@ -10,7 +10,7 @@
 use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH, TECHNIQUES, sizing};
 use super::resampling::{self, Scheme, Settings, Weights};
 use super::{Integrator, IntegratorSpec, ParamDefault, ParamSpec, Params};
-use crate::mis::{Heuristic, Techniques};
+use crate::mis::{Form, Heuristic, Techniques};
 use crate::prepared::Features;
 use crate::spatial::nearest::Metric;
 
@@ -67,7 +67,7 @@ fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> S
         trust: false,
         metric: Metric::Facing,
         radiance: false,
-        split: false,
+        form: Form::Mixture,
         weights: Weights::Balance,
     }
 }

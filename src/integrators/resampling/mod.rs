@@ -12,7 +12,8 @@
 //!
 //! P is positive wherever f is, and p(ȳ)⁻¹ = β_L / f_y, so any weights that sum to one per path make this unbiased. `pcbpt` takes the
 //! weights of bidirectional path tracing; `ris` those that know how resampling changes the density (`mis::resampled`). These ask for
-//! the normalisation Q, whose estimate comes from earlier iterations only, the first of them untallied.
+//! the normalisation Q, whose estimate comes from earlier iterations only, the first of them untallied. As published, `ris` has no mixture
+//! but n + 1 techniques, each with a weight of its own (`split.rs`, `mis::proposals`).
 //!
 //! `two-stage` asks at cache points for a few vertices only, M₂ of all those of M sub-paths, drawn before by what they would bring if
 //! all were in sight (`pmfs.rs`). Groups of neighbouring cache points share what they draw, so that the mixture above is one over the
@@ -32,7 +33,7 @@ pub(in crate::integrators) mod store;
 use super::bdpt::sizing;
 use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, TECHNIQUES};
 use super::{IntegratorSpec, ParamDefault, ParamSpec, Params};
-use crate::mis::Heuristic;
+use crate::mis::{Form, Heuristic};
 use crate::spatial::nearest::Metric;
 pub(in crate::integrators) use resampler::Resampler;
 
@@ -46,7 +47,7 @@ const RR_DEPTH: ParamSpec = ParamSpec { default: ParamDefault::Int(1, 1, 1_000_0
 const KEEP: ParamSpec = ParamSpec {
     name: "keep",
     about: "percent of an eye sub-path's survival of Russian roulette on matt surfaces, where connections find all light: lower, more of them end early",
-    default: ParamDefault::Int(60, 1, 100),
+    default: ParamDefault::Int(40, 1, 100),
 };
 const FIRST_STAGE: ParamSpec = ParamSpec {
     name: "paths",
@@ -97,11 +98,15 @@ const TARGET: ParamSpec = ParamSpec {
     about: "what probabilities at a cache point are proportional to: irradiance, the light that a sub-path brings there; radiance, what of it the surface there sends back to the eye",
     default: ParamDefault::Choice("irradiance", &["irradiance", "radiance"]),
 };
-const PROPOSALS: ParamSpec = ParamSpec {
-    name: "proposals",
-    about: "mixture: eye vertices draw from one mixture of the probabilities around and a uniform share; split: each of these is a technique with a weight of its own, as published (target=irradiance, metric=plain; not with weights=balance)",
-    default: ParamDefault::Choice("mixture", &["mixture", "split"]),
-};
+/// By measurement: where cache points are few it is worth to weigh each by itself; where they are dense, their mixture is the better one, and
+/// to ask them costs as much as it gains but for the rare and bright samples that it spares.
+const fn proposals(default: &'static str) -> ParamSpec {
+    ParamSpec {
+        name: "proposals",
+        about: "mixture: eye vertices draw from one mixture of the probabilities around and a uniform share, of which weights assume that they are those of the place itself; asked: the same, but weights ask the cache points around what these see; split: each of these probabilities is a technique with a weight of its own, as published (asked and split: metric=plain, target=irradiance; not with weights=balance)",
+        default: ParamDefault::Choice(default, &["mixture", "asked", "split"]),
+    }
+}
 const SKIP: ParamSpec = sizing::parameter("auto");
 const fn weights(default: &'static str, choices: &'static [&'static str]) -> ParamSpec {
     ParamSpec {
@@ -126,7 +131,7 @@ const fn one_stage(default_weights: &'static str) -> [ParamSpec; 17] {
         CACHES,
         METRIC,
         TARGET,
-        PROPOSALS,
+        proposals("split"),
         EPSILON,
         DOUBT,
         TRUST,
@@ -150,7 +155,7 @@ const TWO_STAGE_PARAMS: [ParamSpec; 18] = [
     GROUPED_CACHES,
     METRIC,
     TARGET,
-    PROPOSALS,
+    proposals("asked"),
     EPSILON,
     DOUBT,
     TRUST,
@@ -164,7 +169,11 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
         "ris" => Weights::OneStage,
         _ => Weights::TwoStage,
     };
-    let split = params.choice("proposals") == "split" && weights != Weights::Balance;
+    let form = match params.choice("proposals") {
+        "asked" if weights != Weights::Balance => Form::Asked,
+        "split" if weights != Weights::Balance => Form::Split,
+        _ => Form::Mixture,
+    };
     let settings = Settings {
         scheme: Scheme::Caches,
         paths: params.int("paths") as u32,
@@ -175,10 +184,10 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
         epsilon: params.int("epsilon") as f32 * 1e-6,
         doubt: params.int("doubt") as f32 * 1e-6,
         trust: params.choice("trust") == "full",
-        // Which cache points are near a vertex must not depend on the side from which a technique looks at it.
-        metric: if params.choice("metric") == "plain" || split { Metric::Plain } else { Metric::Facing },
-        radiance: params.choice("target") == "radiance" && !split,
-        split,
+        // Which cache points a weight asks must be the same from whichever side a technique looks at a surface.
+        metric: if params.choice("metric") == "plain" || form.asks() { Metric::Plain } else { Metric::Facing },
+        radiance: params.choice("target") == "radiance" && !form.asks(),
+        form,
         weights,
     };
     let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
@@ -282,8 +291,8 @@ pub(in crate::integrators) struct Settings {
     pub metric: Metric,
     /// Probabilities at cache points count the BSDF there.
     pub radiance: bool,
-    /// Every proposal is a technique of its own.
-    pub split: bool,
+    /// What is one technique, and what weights know of cache points.
+    pub form: Form,
     /// What weights know.
     pub weights: Weights,
 }

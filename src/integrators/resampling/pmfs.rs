@@ -46,6 +46,8 @@ pub(super) struct GroupPmf {
     cdf: Vec<Block>,
     /// For each cache point, the last of each block: where a search begins.
     ends: Vec<f32>,
+    /// For each entry, which cache points of the group it brings light to: a bit for each.
+    seen: Vec<u16>,
     /// For each cache point, what it found.
     found: Vec<Found>,
     ranges: Vec<Range<usize>>,
@@ -88,6 +90,8 @@ impl Row<'_> {
 /// A choice among entries.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
+    /// Its number among the entries it was chosen from.
+    pub entry: usize,
     /// Place of the light vertex in the store's order.
     pub vertex: usize,
     /// Probability of the vertex among all: P₁ P₂.
@@ -120,8 +124,8 @@ impl GroupPmf {
     #[inline]
     fn choice(&self, e: usize, p: f32) -> Choice {
         match self.entries.get(e) {
-            Some(entry) => Choice { vertex: entry.vertex as usize, probability: p / entry.stands_for },
-            None => Choice { vertex: e, probability: p },
+            Some(entry) => Choice { entry: e, vertex: entry.vertex as usize, probability: p / entry.stands_for },
+            None => Choice { entry: e, vertex: e, probability: p },
         }
     }
 
@@ -150,6 +154,8 @@ impl GroupPmf {
         self.cdf.clear();
         self.cdf.resize(group.len() * blocks, Block::default());
         self.ends.clear();
+        self.seen.clear();
+        self.seen.resize(self.count, 0);
         self.found.clear();
         self.found.resize(group.len(), [0.0; 3]);
         let (points, sides) = (&caches.index.points()[group.clone()], &caches.index.normals()[group.clone()]);
@@ -174,6 +180,7 @@ impl GroupPmf {
             let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
             let seen = asked[..packet.len].iter().enumerate().filter(|(i, _)| blocked >> i & 1 == 0);
             let by = seen.clone().fold(0u16, |by, (_, (c, _))| by | 1 << c);
+            self.seen[e] = by;
             for (_, &(c, brings)) in seen {
                 self.cdf[c * blocks + e / BLOCK].0[e % BLOCK] = caches.aim(group.start + c, y.p, brings);
                 self.found[c][0] += f64::from(brings);
@@ -276,6 +283,17 @@ impl Pmfs {
             p += share * row.map_or(uniform, |row| row.probability(e));
         }
         Some(group.choice(e, p))
+    }
+
+    /// Bit `i` set: entry `e`, from which cache points `near` choose, brings light to number `i` of them.
+    #[inline]
+    pub fn seen(&self, near: &[usize], e: usize) -> u16 {
+        let mut bits = 0;
+        for (i, &cache) in near.iter().enumerate() {
+            let group = &self.groups[self.group_of[cache] as usize];
+            bits |= (group.seen[e] >> (cache - group.first) & 1) << i;
+        }
+        bits
     }
 
     fn group(&self, cache: usize) -> Option<&GroupPmf> {

@@ -11,7 +11,7 @@ use crate::integrators::bdpt::eye_path::Candidate;
 use crate::math::Vec3;
 use crate::math::hash::HashRng;
 use crate::mis::definition::Joined;
-use crate::mis::{Resampled, There};
+use crate::mis::{Form, Resampled, There};
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 use crate::ray::offset::SegmentEnd;
@@ -38,7 +38,7 @@ pub(in crate::integrators) struct Resampler {
 
 /// The side of a point's surface on which the direction `d` leaves it.
 #[inline]
-fn side(point: &SurfacePoint, d: Vec3) -> Vec3 {
+pub(super) fn side(point: &SurfacePoint, d: Vec3) -> Vec3 {
     if point.ng.dot(d) < 0.0 { -point.ng } else { point.ng }
 }
 
@@ -61,7 +61,7 @@ impl Resampler {
     #[inline]
     pub fn there(&self, point: &SurfacePoint, d: Vec3) -> There {
         match &self.caches {
-            Some(caches) if self.settings.weights != Weights::Balance && !self.settings.split => {
+            Some(caches) if self.settings.weights != Weights::Balance && !self.settings.form.asks() => {
                 caches.there(point.p, side(point, d))
             }
             _ => There::default(),
@@ -71,14 +71,14 @@ impl Resampler {
     /// c of a connection by its definition.
     pub fn factor_of(&self, scene: &PreparedScene, resampled: &Resampled, joined: &Joined) -> f32 {
         let Joined { y, from, z, to, distance2, arriving, brings } = joined;
-        if !resampled.split {
+        if !resampled.form.asks() {
             return resampled.factor(*brings, *distance2, self.there(&z.point, -*to));
         }
-        let near = self.near(z.point.p, z.point.ng);
+        let near = self.near(&z.point, -*to);
         let end = SegmentEnd::Surface { p: y.point.p, error: y.point.error, ng: y.point.ng };
         let seen = self.seen_by(&near, &end, &mut Tracer::new(&*scene.query));
         let value = |to: Vec3| y.bsdf.eval(*from, to, Transport::Importance);
-        resampled.shares(*arriving, &self.proposals(&near, (y.point.p, y.point.ng), seen, value)).sum()
+        resampled.factor_of(*arriving, &self.proposals(&near, (y.point.p, y.point.ng), seen, value))
     }
 
     /// What weights know.
@@ -97,7 +97,7 @@ impl Resampler {
             doubt: self.settings.doubt,
             uniform: 1.0 / (self.settings.neighbours + 1) as f32,
             vertices_per_path: if paths > 0 { (vertices as f64 / paths as f64) as f32 } else { 0.0 },
-            split: self.settings.split,
+            form: self.settings.form,
         })
     }
 
@@ -116,7 +116,7 @@ impl Resampler {
             return;
         }
         if matches!(self.settings.scheme, Scheme::Caches) {
-            let near = self.near(point.p, side(point, wo));
+            let near = self.near(point, wo);
             for _ in 0..self.settings.samples {
                 let u = rng.next_4();
                 if u[2] < effort
@@ -163,13 +163,16 @@ impl Resampler {
     /// Draws a candidate by the cache points `near`; `None` if there are none. Only a share `effort` of draws is made.
     #[inline]
     fn draw(&self, near: &Near, u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
-        let (proposal, Choice { vertex, probability }) = match near.caches() {
-            _ if self.settings.split => self.draw_split(near, u).map(|(proposal, choice)| (Some(proposal), choice))?,
+        let (proposal, Choice { entry, vertex, probability }) = match near.caches() {
+            _ if self.settings.form == Form::Split => {
+                self.draw_split(near, u).map(|(proposal, choice)| (Some(proposal), choice))?
+            }
             [] => (None, self.draw_anything(u[1])?),
             caches => (None, self.pmfs.draw(caches, u)?),
         };
         let scale = 1.0 / (probability * self.settings.paths as f32 * self.settings.samples as f32 * effort);
-        Some(Candidate { proposal, ..self.store.candidate(vertex, scale) })
+        let seen = if self.settings.form.asks() { self.pmfs.seen(near.caches(), entry) } else { 0 };
+        Some(Candidate { proposal, near: (*near, seen), ..self.store.candidate(vertex, scale) })
     }
 
     /// Far from all cache points: uniformly or, as a first stage would, by f_y/p.
@@ -177,10 +180,10 @@ impl Resampler {
         let all = self.store.len();
         if self.settings.second_stage.is_none() {
             let vertex = ((u * all as f32) as usize).min(all - 1);
-            return Some(Choice { vertex, probability: 1.0 / all as f32 });
+            return Some(Choice { entry: vertex, vertex, probability: 1.0 / all as f32 });
         }
         let (vertex, p) = self.store.tree.draw(&(0..all), u)?;
-        Some(Choice { vertex, probability: p as f32 })
+        Some(Choice { entry: vertex, vertex, probability: p as f32 })
     }
 
     /// What there is to draw by, for people.

@@ -5,14 +5,14 @@
 
 use super::caches::Caches;
 use super::pmfs::Choice;
-use super::resampler::Resampler;
+use super::resampler::{Resampler, side};
 use super::store::direction_to;
 use crate::integrators::bdpt::light_path::LightVertex;
 use crate::math::{Rgb, Vec3};
 use crate::mis::{Proposal, Proposals};
 use crate::ray::offset::{SegmentEnd, segment};
 use crate::ray::{RayKind, SegmentPacket, Tracer};
-use crate::shade::{BsdfRef, Transport};
+use crate::shade::{BsdfRef, SurfacePoint, Transport};
 use crate::spatial::nearest::MOST;
 
 /// The cache points near a place.
@@ -30,12 +30,13 @@ impl Near {
 }
 
 impl Resampler {
-    /// The cache points near the place `p` on the side `n` of a surface.
+    /// The cache points near a point, on the side of the direction `d`. (Where weights ask them the side does not matter.)
     #[inline]
-    pub fn near(&self, p: Vec3, n: Vec3) -> Near {
+    pub fn near(&self, point: &SurfacePoint, d: Vec3) -> Near {
+        let n = side(point, d);
         let mut near = Near::default();
         if let Some(caches) = &self.caches {
-            for i in caches.index.find(p, n).take(self.settings.neighbours) {
+            for i in caches.index.find(point.p, n).take(self.settings.neighbours) {
                 near.caches[near.count] = i;
                 near.count += 1;
             }
@@ -71,8 +72,7 @@ impl Resampler {
     }
 
     /// The cache points `near` as seen from the light vertex `y`, whose BSDF is `bsdf`.
-    pub fn proposals_of(&self, near: &Near, y: &LightVertex, bsdf: &BsdfRef, tracer: &mut Tracer) -> Proposals {
-        let seen = self.seen_by(near, &y.end(), tracer);
+    pub fn proposals_of(&self, near: &Near, y: &LightVertex, bsdf: &BsdfRef, seen: u16) -> Proposals {
         self.proposals(near, (y.p, y.ng), seen, |to| bsdf.eval(y.wo, to, Transport::Importance))
     }
 

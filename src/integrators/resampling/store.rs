@@ -197,6 +197,7 @@ impl LightStore {
             origin: None,
             number: Some(*number),
             proposal: None,
+            near: Default::default(),
             scale,
         }
     }
