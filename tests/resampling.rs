@@ -16,7 +16,7 @@ const SPP: u64 = 32;
 #[test]
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
-    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 24] = [
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 26] = [
         (ris, &[("paths", "1")]),
         (ris, &[("paths", "2"), ("neighbours", "1")]),
         (ris, &[("paths", "200"), ("neighbours", "0")]),
@@ -41,6 +41,8 @@ fn parameters_do_not_change_the_expectation() {
         (&importance::SKELETON, &[("acceptance", "0"), ("cells", "30")]),
         (&importance::SKELETON, &[("paths", "7"), ("skip", "never")]),
         (&importance::IC_BDPT, &[("paths", "7"), ("neighbours", "1")]),
+        (&importance::SKELETON, &[("weights", "aware"), ("acceptance", "0"), ("cells", "30")]),
+        (&importance::IC_BDPT, &[("weights", "aware"), ("skip", "never")]),
     ];
     // Diffuse and glossy; lit from everywhere; by lights that have no size.
     let shown = ["room", "environment", "delta-lights", "principled"];

@@ -8,7 +8,7 @@ mod scenes;
 
 use gallery::{GALLERY, exhibit};
 use lightsieve::integrators::replay::Contribution;
-use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, resampling};
+use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, importance, resampling};
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
 use lightsieve::mis::definition::{Densities, densities};
 use lightsieve::mis::{Heuristic, Joint, Node, Split, Techniques, Weigher};
@@ -44,7 +44,7 @@ fn weigher(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, roulet
     let mut techniques = Techniques::parse(techniques).unwrap();
     techniques.set_light_paths(scene.film_size[0] as f32 * scene.film_size[1] as f32);
     let limits = Limits { max_edges: u32::MAX, roulette_from, keep: 1.0 };
-    Weigher { techniques, heuristic, eye_limits: limits, light_limits: limits, resampled: None }
+    Weigher { techniques, heuristic, eye_limits: limits, light_limits: limits, resampled: None, lengths: None }
 }
 
 const SUBSETS: [&str; 6] = ["all", "-*:1", "-0:*", "-1:*", "all,-2:2,-3:1,-0:3", "-*:1,-0:*"];
@@ -91,7 +91,21 @@ fn resampling_aware_weights_are_those_of_the_definition() {
             ];
             let two_stage = [&params[..], &[("second_stage", ["16", "1", "200"][i % 3])]].concat();
             let one = found(&resampling::RIS, &scene, &params, 2);
-            for c in one.into_iter().chain(found(&resampling::TWO_STAGE, &scene, &two_stage, 2)) {
+            let by_length = [
+                ("weights", "aware"),
+                ("techniques", techniques),
+                ("rr_depth", roulette),
+                ("paths", ["1024", "20", "1"][i % 3]),
+            ];
+            let skeleton = [&by_length[..], &[("acceptance", "0"), ("cells", "30")]].concat();
+            let records = [&by_length[..], &[("records", "20000")]].concat();
+            let all = [
+                one,
+                found(&resampling::TWO_STAGE, &scene, &two_stage, 2),
+                found(&importance::SKELETON, &scene, &skeleton, 2),
+                found(&importance::IC_BDPT, &scene, &records, 2),
+            ];
+            for c in all.into_iter().flatten() {
                 let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
                 let what = format!("{name} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
                 assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");

@@ -26,6 +26,8 @@ pub struct Densities {
 /// Two neighbouring vertices of a path, of which the first could have been the last of a light sub-path that was resampled for the other.
 #[derive(Clone, Copy, Debug)]
 pub struct Joined<'a> {
+    /// Number of vertices of that light sub-path.
+    pub s: usize,
     /// The one nearer to the light.
     pub y: &'a Interior,
     /// Unit direction from `y` to the vertex before it.
@@ -125,6 +127,7 @@ pub fn densities(
                 unscattered: luminance(arriving) * v.point.ng.dot(to).abs(),
             };
             let joined = Joined {
+                s: i,
                 y: v,
                 from,
                 z: &path.interior[i - 1],

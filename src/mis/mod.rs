@@ -11,6 +11,7 @@
 
 pub mod definition;
 pub mod effort;
+pub mod lengths;
 pub mod proposals;
 pub mod resampled;
 pub mod side;
@@ -18,6 +19,7 @@ pub mod techniques;
 pub mod weigh;
 
 pub use effort::{Costs, Effort, EffortStatistics};
+pub use lengths::Lengths;
 pub use proposals::{Proposal, Proposals, Shares};
 pub use resampled::{Form, Resampled, Targets, There};
 pub use side::{Lit, Node, Side, next_event, spread};

@@ -24,8 +24,12 @@ use crate::spatial::nearest::MOST;
 pub struct Proposal {
     /// ρ G V from the light vertex to the cache point, to be multiplied by β_L there; zero if something is in the way.
     pub scattered: Rgb,
-    /// G: the same without ρ, and nothing in the way.
+    /// The same with nothing in the way; used of sites of importance caching only.
+    pub open: Rgb,
+    /// G: without ρ, and nothing in the way.
     pub unscattered: f32,
+    /// Number of the site of importance caching.
+    pub site: u32,
     /// Q of both targets at the cache point.
     pub all: Targets,
 }
@@ -47,7 +51,10 @@ impl Proposals {
     /// No cache points.
     pub const NONE: Proposals = {
         let all = Targets { scattered: 0.0, unscattered: 0.0 };
-        Proposals { count: 0, each: [Proposal { scattered: Rgb::BLACK, unscattered: 0.0, all }; MOST] }
+        Proposals {
+            count: 0,
+            each: [Proposal { scattered: Rgb::BLACK, open: Rgb::BLACK, unscattered: 0.0, site: 0, all }; MOST],
+        }
     };
 }
 
@@ -137,7 +144,8 @@ mod tests {
 
     fn near(scattered: [f32; MOST]) -> Proposals {
         let all = Targets { scattered: 2.0, unscattered: 5.0 };
-        let each = scattered.map(|s| Proposal { scattered: Rgb::grey(s), unscattered: 1.5, all });
+        let each =
+            scattered.map(|s| Proposal { scattered: Rgb::grey(s), unscattered: 1.5, all, ..Proposal::default() });
         Proposals { count: MOST, each }
     }
 

@@ -14,7 +14,7 @@
 //! resampled connection; all others are 1, or 0 if an end of the connection is a delta event. Roulette is part of the densities: where it is played is counted from the end that walks.
 
 use super::side::{Lit, Node};
-use super::{Heuristic, Proposals, Resampled, Targets, Techniques};
+use super::{Heuristic, Lengths, Proposals, Resampled, Targets, Techniques};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::Limits;
 
@@ -70,6 +70,8 @@ pub struct Weigher {
     pub light_limits: Limits,
     /// How connections with s ≥ 2 and t ≥ 2 are resampled, if they are and weights know of it.
     pub resampled: Option<Resampled>,
+    /// What is known of each length, if sub-paths of each are resampled by themselves.
+    pub lengths: Option<Lengths>,
 }
 
 /// What a path's techniques weigh; all weights of a path sum to one.
@@ -99,6 +101,15 @@ impl Weigher {
             1 if t >= 2 => n * path.next_event,
             _ if s >= 2 && t >= 2 => n * factor,
             _ => n,
+        }
+    }
+
+    /// c of a resampled connection to a light vertex, the last of `s`, at which the light β_L = `arriving` is; `proposals` is what the cache
+    /// points or sites near the eye vertex said of it.
+    pub fn asked(&self, resampled: &Resampled, arriving: Rgb, proposals: &Proposals, s: usize) -> f32 {
+        match &self.lengths {
+            Some(lengths) => lengths.factor(arriving, proposals, s),
+            None => resampled.factor_of(arriving, proposals),
         }
     }
 
@@ -180,7 +191,7 @@ impl Weigher {
         if resampled.form.asks() {
             let proposals =
                 path.eye_proposals.and_then(|(others, last)| if n + 1 == t { Some(last) } else { others.get(n) });
-            return resampled.factor_of(before, proposals.unwrap_or(&Proposals::NONE));
+            return self.asked(resampled, before, proposals.unwrap_or(&Proposals::NONE), s + t - n);
         }
         resampled.factor(brings, lit.distance2, path.eye_lit[n - 1].there)
     }

@@ -7,7 +7,7 @@ use crate::emit::{DirectSample, LightEnd};
 use crate::integrators::Iteration;
 use crate::integrators::replay::{Contribution, Replay};
 use crate::integrators::resampling::Resampler;
-use crate::integrators::resampling::split::Near;
+use crate::integrators::resampling::near::Near;
 use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
@@ -56,8 +56,8 @@ pub(in crate::integrators) struct Candidate<'a> {
     pub number: Option<u32>,
     /// The proposal that drew it, where each is a technique of its own.
     pub proposal: Option<usize>,
-    /// The cache points near the eye vertex it was drawn for, and which of them see it, where weights ask for them.
-    pub near: (Near, u16),
+    /// The cache points near the eye vertex it was drawn for, and which of them see it, if weights ask and that is known.
+    pub near: Option<(Near, u16)>,
     /// One over the expected number of times that this sub-path is drawn for one of its kind.
     pub scale: f32,
 }
@@ -74,7 +74,7 @@ impl<'a> Candidate<'a> {
             origin: path.origin,
             number: None,
             proposal: None,
-            near: Default::default(),
+            near: None,
             scale,
         }
     }
@@ -131,7 +131,7 @@ impl EyeHooks<'_, '_> {
             });
             let path = origin.map(|origin| record.path(origin, s, n_eye, lens));
             let factor_of = |resampled: &Resampled, joined: &Joined| {
-                resampler.as_ref().map_or(1.0, |r| r.factor_of(scene, resampled, joined))
+                resampler.as_ref().map_or(1.0, |r| r.factor_of(scene, weigher, resampled, joined))
             };
             record.found(scene, weigher, &factor_of, Contribution::new((s, t), pixel, raw, weight.own), path)
         });
@@ -324,14 +324,18 @@ impl EyeHooks<'_, '_> {
         let spread_z = spread(z.ng.dot(to_light), dist2);
         let factor = weigher.resampled.map_or(1.0, |resampled| {
             if let Some(resampler) = self.asks() {
-                let (near, seen) = &to.near;
-                let proposals = resampler.proposals_of(near, light, &to.bsdf, *seen);
+                let (near, seen) = to.near.unwrap_or_else(|| {
+                    let near = resampler.near(z, to_light);
+                    let seen = resampler.seen_by(&near, &y.end(), tracer);
+                    (near, seen)
+                });
+                let proposals = resampler.proposals_of(&near, light, &to.bsdf, seen);
                 // Of what all proposals make of the path, this one makes its share.
                 if let Some(proposal) = to.proposal {
                     let shares = resampled.shares(light.throughput, &proposals);
                     raw *= shares.of(proposal) / shares.sum();
                 }
-                return resampled.factor_of(light.throughput, &proposals);
+                return weigher.asked(&resampled, light.throughput, &proposals, light.length());
             }
             let brings = Targets {
                 scattered: scattered.luminance() * spread_z,

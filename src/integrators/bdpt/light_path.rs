@@ -178,7 +178,7 @@ impl LightHooks<'_, '_> {
         let note = self.record.as_mut().map_or(0, |record| {
             let path = origin.map(|o| record.path(Origin { leaving, ..o }, s, 0, lens.p));
             let factor_of = |resampled: &Resampled, joined: &Joined| {
-                resampler.as_ref().map_or(1.0, |r| r.factor_of(scene, resampled, joined))
+                resampler.as_ref().map_or(1.0, |r| r.factor_of(scene, weigher, resampled, joined))
             };
             record.found(scene, weigher, &factor_of, Contribution::new((s, 1), (x, y), raw, weight.own), path)
         });
@@ -298,7 +298,12 @@ impl LightHooks<'_, '_> {
             return before.map_or(1.0, |y| {
                 let bsdf = self.out.bsdfs.get(&y.bsdf, y.ng);
                 let seen = resampler.seen_by(&near, &y.end(), tracer);
-                resampled.factor_of(y.throughput, &resampler.proposals_of(&near, y, &bsdf, seen))
+                self.this.weigher.asked(
+                    resampled,
+                    y.throughput,
+                    &resampler.proposals_of(&near, y, &bsdf, seen),
+                    y.length(),
+                )
             });
         }
         let dist2 = distance * distance;

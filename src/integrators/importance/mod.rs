@@ -43,6 +43,13 @@ const ACCEPTANCE: ParamSpec = ParamSpec {
     about: "nodes with at most so many percent of the mean number of eye vertices are left out; there, draws are uniform",
     default: ParamDefault::Int(100, 0, 10_000),
 };
+const WEIGHTS: ParamSpec = ParamSpec {
+    name: "weights",
+    about: "what weights know: balance: nothing of how sub-paths are drawn, as published; aware: what the places around would draw",
+    default: ParamDefault::Choice("balance", &["balance", "aware"]),
+};
+/// Smallest ratio p/q that weights use, as in `ris`.
+const EPSILON: f32 = 1e-3;
 const SKIP: ParamSpec = sizing::parameter("auto");
 
 fn build(params: &Params, settings: Settings, techniques: Techniques, size: bool) -> Box<dyn Integrator> {
@@ -52,6 +59,14 @@ fn build(params: &Params, settings: Settings, techniques: Techniques, size: bool
         this.size_by_scene();
     }
     Box::new(this)
+}
+
+/// The same with the weights that `params` ask for.
+fn aware(params: &Params, settings: Settings) -> Settings {
+    match params.choice("weights") {
+        "aware" => Settings { weights: Weights::OneStage, form: Form::Asked, epsilon: EPSILON, ..settings },
+        _ => settings,
+    }
 }
 
 fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> Settings {
@@ -77,14 +92,19 @@ pub static SKELETON: IntegratorSpec = IntegratorSpec {
     name: "skeleton",
     aliases: &["skelbpt"],
     about: "Skeleton based connections (SkelBPT): eye vertices draw light sub-paths of each length by what is seen from the middle of the room they are in",
-    params: &[MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, CELLS, ACCEPTANCE, SKIP],
+    params: &[MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, CELLS, ACCEPTANCE, WEIGHTS, SKIP],
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
     build: |params| {
         let cells = usize::try_from(params.int("cells")).ok().filter(|&n| n > 0);
         let scheme = Scheme::Skeleton { cells, acceptance: params.int("acceptance") as f64 * 0.01 };
-        build(params, settings(params, scheme, 0, 1), params.techniques("techniques"), params.choice("skip") == "auto")
+        build(
+            params,
+            aware(params, settings(params, scheme, 0, 1)),
+            params.techniques("techniques"),
+            params.choice("skip") == "auto",
+        )
     },
 };
 
@@ -93,14 +113,14 @@ pub static IC_BDPT: IntegratorSpec = IntegratorSpec {
     name: "ic-bdpt",
     aliases: &["icbpt"],
     about: "Bidirectional path tracing with importance caching (ICBPT): eye vertices draw light sub-paths of each length by probabilities kept at records on surfaces",
-    params: &[MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, RECORDS, NEIGHBOURS, SKIP],
+    params: &[MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, RECORDS, NEIGHBOURS, WEIGHTS, SKIP],
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
     build: |params| {
         let scheme = Scheme::Records { pooled: false };
         let settings = settings(params, scheme, params.int("records"), params.int("neighbours"));
-        build(params, settings, params.techniques("techniques"), params.choice("skip") == "auto")
+        build(params, aware(params, settings), params.techniques("techniques"), params.choice("skip") == "auto")
     },
 };
 

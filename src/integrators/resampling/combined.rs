@@ -49,8 +49,16 @@ pub(super) struct CombinedPmfs {
     classes: Vec<Class>,
     /// Places in the store's order, class by class.
     vertices: Vec<u32>,
-    /// For each group of sites: for each site and vertex the probability of the vertices of its class up to it.
-    groups: Vec<Vec<f32>>,
+    groups: Vec<Group>,
+}
+
+/// A group of sites.
+#[derive(Debug, Default)]
+struct Group {
+    /// For each site and vertex the probability of the vertices of its class up to it.
+    cdf: Vec<f32>,
+    /// For each site and class the sums of what seen, open and bounded go by.
+    sums: Vec<[f64; DISTRIBUTIONS - 1]>,
 }
 
 /// What vertices bring to the sites of a group: for each site one after the other.
@@ -61,13 +69,11 @@ struct Brought {
     bounded: Vec<f32>,
 }
 
-/// Combines distributions over one class, each given up to a factor, into cumulative probabilities.
-fn combine(weights: [&[f32]; DISTRIBUTIONS - 1], cdf: &mut [f32]) {
+/// Combines distributions over one class, each given up to a factor, into cumulative probabilities; returns their sums.
+fn combine(weights: [&[f32]; DISTRIBUTIONS - 1], cdf: &mut [f32]) -> [f64; DISTRIBUTIONS - 1] {
     let n = cdf.len();
-    let scales = weights.map(|w| {
-        let sum: f64 = w.iter().map(|v| f64::from(*v)).sum();
-        if sum > 0.0 && sum.is_finite() { 1.0 / sum } else { 0.0 }
-    });
+    let sums = weights.map(|w| w.iter().map(|v| f64::from(*v)).sum::<f64>());
+    let scales = sums.map(|sum| if sum > 0.0 && sum.is_finite() { 1.0 / sum } else { 0.0 });
     let uniform = 1.0 / n as f64;
     let winner = |i: usize| {
         let mut best = (DISTRIBUTIONS - 1, uniform);
@@ -94,6 +100,7 @@ fn combine(weights: [&[f32]; DISTRIBUTIONS - 1], cdf: &mut [f32]) {
     if let Some(last) = cdf.last_mut() {
         *last = 1.0;
     }
+    sums
 }
 
 impl CombinedPmfs {
@@ -101,22 +108,23 @@ impl CombinedPmfs {
     pub fn find(&mut self, scene: &PreparedScene, sites: &Sites, store: &LightStore, pooled: bool) -> RayStats {
         self.classify(store, pooled);
         let groups: Vec<Range<usize>> = sites.groups().collect();
-        self.groups.resize_with(groups.len(), Vec::new);
+        self.groups.resize_with(groups.len(), Group::default);
         let (classes, vertices) = (&self.classes, &self.vertices);
         self.groups
             .par_iter_mut()
             .zip(&groups)
-            .map_init(Brought::default, |brought, (cdf, group)| {
+            .map_init(Brought::default, |brought, (Group { cdf, sums }, group)| {
                 let mut tracer = Tracer::new(&*scene.query);
                 bring(sites, group, store, vertices, brought, &mut tracer);
                 cdf.clear();
                 cdf.resize(group.len() * vertices.len(), 0.0);
+                sums.clear();
                 for site in 0..group.len() {
                     for class in classes {
                         let at = |offset: &usize| site * vertices.len() + offset;
                         let range = at(&class.range.start)..at(&class.range.end);
                         let weights = [&brought.seen, &brought.open, &brought.bounded].map(|w| &w[range.clone()]);
-                        combine(weights, &mut cdf[range]);
+                        sums.push(combine(weights, &mut cdf[range]));
                     }
                 }
                 tracer.stats
@@ -148,6 +156,13 @@ impl CombinedPmfs {
         }
     }
 
+    /// For each site the classes' lengths, their numbers of vertices, and the sums of what seen, open and bounded go by.
+    pub fn found(&self) -> impl Iterator<Item = impl Iterator<Item = (usize, usize, [f64; DISTRIBUTIONS - 1])>> {
+        let classes = self.classes.len();
+        let sites = self.groups.iter().flat_map(move |group| group.sums.chunks_exact(classes.max(1)));
+        sites.map(|sums| self.classes.iter().zip(sums).map(|(class, sums)| (class.s, class.range.len(), *sums)))
+    }
+
     /// Number of classes.
     pub fn classes(&self) -> usize {
         self.classes.len()
@@ -167,7 +182,7 @@ impl CombinedPmfs {
         let n = range.len();
         let mut rows: [&[f32]; MOST] = [&[]; MOST];
         for (row, site) in rows.iter_mut().zip(found) {
-            let cdf = &self.groups[site / PACKET];
+            let cdf = &self.groups[site / PACKET].cdf;
             *row = &cdf[site % PACKET * self.vertices.len()..][range.clone()];
         }
         let rows = &rows[..found.len().min(MOST)];

@@ -13,7 +13,7 @@
 //! P is positive wherever f is, and p(ȳ)⁻¹ = β_L / f_y, so any weights that sum to one per path make this unbiased. `pcbpt` takes the
 //! weights of bidirectional path tracing; `ris` those that know how resampling changes the density (`mis::resampled`). These ask for
 //! the normalisation Q, whose estimate comes from earlier iterations only, the first of them untallied. As published, `ris` has no mixture
-//! but n + 1 techniques, each with a weight of its own (`split.rs`, `mis::proposals`).
+//! but n + 1 techniques, each with a weight of its own (`near.rs`, `mis::proposals`).
 //!
 //! `two-stage` asks at cache points for a few vertices only, M₂ of all those of M sub-paths, drawn before by what they would bring if
 //! all were in sight (`pmfs.rs`). Groups of neighbouring cache points share what they draw, so that the mixture above is one over the
@@ -22,12 +22,13 @@
 //! Candidates are the first M of an iteration's light sub-paths, whose splats the light image takes in any case.
 
 pub(in crate::integrators) mod caches;
+pub(in crate::integrators) mod near;
 mod pmfs;
 mod combined;
+mod learnt;
 mod prepare;
 pub(in crate::integrators) mod resampler;
 mod sites;
-pub(in crate::integrators) mod split;
 pub(in crate::integrators) mod store;
 
 use super::bdpt::sizing;

@@ -1,6 +1,7 @@
 //! What happens between iterations: light sub-paths are traced, probabilities found, normalisations learnt, states restored.
 
 use super::caches::Caches;
+use super::combined::CombinedPmfs;
 use super::pmfs::Pmfs;
 use super::resampler::Resampler;
 use super::sites::Sites;
@@ -54,6 +55,7 @@ impl Bidirectional {
                 stats.merge(&s);
                 self.know_lengths(store.lengths(), WARM_UP_PATHS);
             }
+            self.prepare_sites(iteration, stats);
             return;
         }
         let (mut caches, s) = Caches::new(scene, iteration.seed, &resampler.settings, &self.weigher.eye_limits);
@@ -74,6 +76,26 @@ impl Bidirectional {
         }
     }
 
+    /// What sites find before the first iteration, if weights ask them.
+    fn prepare_sites(&mut self, iteration: &Iteration, stats: &mut RayStats) {
+        let Some(Settings { form, paths, .. }) = self.resampler.as_ref().map(|r| r.settings) else { return };
+        if !form.asks() {
+            return;
+        }
+        let first = Iteration { index: 0, ..*iteration };
+        for set in 1..=WARM_UP {
+            let (store, s) = LightStore::trace(self, &first, (paths.min(WARM_UP_PATHS), set), false);
+            stats.merge(&s);
+            let mut combined = CombinedPmfs::default();
+            if let Some(resampler) = &mut self.resampler
+                && let Some(sites) = &resampler.sites
+            {
+                stats.merge(&combined.find(iteration.scene, sites, &store, false));
+                resampler.learnt.learn(&combined);
+            }
+        }
+    }
+
     /// How many of `paths` light sub-paths have a vertex number s, by s.
     fn know_lengths(&mut self, counts: Vec<u32>, paths: u32) {
         let Some(resampler) = &mut self.resampler else { return };
@@ -89,7 +111,7 @@ impl Bidirectional {
             phases.time("placing caches", || self.prepare_caches(iteration, &mut stats));
         }
         let Some(resampler) = &mut self.resampler else { return (stats, vec![]) };
-        self.weigher.resampled = resampler.resampled();
+        (self.weigher.resampled, self.weigher.lengths) = (resampler.resampled(), resampler.by_length());
         let Settings { second_stage, paths, .. } = resampler.settings;
         let mut store = std::mem::take(&mut resampler.store);
         let pieces = phases.time("light paths", || self.light_pass(iteration, paths, &mut store));
@@ -136,9 +158,11 @@ impl Bidirectional {
 
     /// The iteration is over: what it found may now be known.
     pub(in crate::integrators) fn learn(&mut self) {
-        if let Some(resampler) = &mut self.resampler
-            && let Some(caches) = &mut resampler.caches
-        {
+        let Some(resampler) = &mut self.resampler else { return };
+        if resampler.sites.is_some() && resampler.settings.form.asks() {
+            resampler.learnt.learn(&resampler.combined);
+        }
+        if let Some(caches) = &mut resampler.caches {
             caches.learn(resampler.pmfs.found());
             resampler.seen[0] += resampler.store.len() as u64;
             resampler.seen[1] += u64::from(resampler.store.paths_traced);
@@ -157,6 +181,9 @@ impl Bidirectional {
         match &mut self.resampler {
             Some(resampler) => {
                 resampler.seen = [vertices, paths];
+                if resampler.sites.is_some() {
+                    return resampler.learnt.restore(&words);
+                }
                 rest.is_empty() && resampler.caches.as_mut().is_some_and(|c| c.restore(sums.to_vec(), iterations))
             }
             None => false,

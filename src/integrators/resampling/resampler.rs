@@ -2,16 +2,17 @@
 
 use super::caches::Caches;
 use super::combined::CombinedPmfs;
+use super::learnt::Learnt;
+use super::near::Near;
 use super::pmfs::{Choice, Pmfs};
 use super::sites::Sites;
-use super::split::Near;
 use super::store::LightStore;
 use super::{Scheme, Settings, Weights};
 use crate::integrators::bdpt::eye_path::Candidate;
 use crate::math::Vec3;
 use crate::math::hash::HashRng;
 use crate::mis::definition::Joined;
-use crate::mis::{Form, Resampled, There};
+use crate::mis::{Form, Lengths, Resampled, There, Weigher};
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 use crate::ray::offset::SegmentEnd;
@@ -28,6 +29,8 @@ pub(in crate::integrators) struct Resampler {
     /// Sites of importance caching, and probabilities there.
     pub(super) sites: Option<Sites>,
     pub(super) combined: CombinedPmfs,
+    /// What sites have found so far, if weights ask them.
+    pub(super) learnt: Learnt,
     /// Where sub-paths of each length are drawn from by themselves: the share of sub-paths that are as long.
     pub(super) lengths: Vec<f32>,
     /// Sum over sets of the number of vertices, and of sub-paths.
@@ -51,6 +54,7 @@ impl Resampler {
             pmfs: Pmfs::default(),
             sites: None,
             combined: CombinedPmfs::default(),
+            learnt: Learnt::default(),
             lengths: vec![],
             seen: [0; 2],
             ready: None,
@@ -69,8 +73,8 @@ impl Resampler {
     }
 
     /// c of a connection by its definition.
-    pub fn factor_of(&self, scene: &PreparedScene, resampled: &Resampled, joined: &Joined) -> f32 {
-        let Joined { y, from, z, to, distance2, arriving, brings } = joined;
+    pub fn factor_of(&self, scene: &PreparedScene, weigher: &Weigher, resampled: &Resampled, joined: &Joined) -> f32 {
+        let Joined { s, y, from, z, to, distance2, arriving, brings } = joined;
         if !resampled.form.asks() {
             return resampled.factor(*brings, *distance2, self.there(&z.point, -*to));
         }
@@ -78,7 +82,7 @@ impl Resampler {
         let end = SegmentEnd::Surface { p: y.point.p, error: y.point.error, ng: y.point.ng };
         let seen = self.seen_by(&near, &end, &mut Tracer::new(&*scene.query));
         let value = |to: Vec3| y.bsdf.eval(*from, to, Transport::Importance);
-        resampled.factor_of(*arriving, &self.proposals(&near, (y.point.p, y.point.ng), seen, value))
+        weigher.asked(resampled, *arriving, &self.proposals(&near, (y.point.p, y.point.ng), seen, value), *s)
     }
 
     /// What weights know.
@@ -99,6 +103,15 @@ impl Resampler {
             vertices_per_path: if paths > 0 { (vertices as f64 / paths as f64) as f32 } else { 0.0 },
             form: self.settings.form,
         })
+    }
+
+    /// What weights know of each length, where each is drawn from by itself.
+    pub(super) fn by_length(&self) -> Option<Lengths> {
+        if self.sites.is_none() || !self.settings.form.asks() {
+            return None;
+        }
+        let numbers = (0..self.lengths.len()).map(|s| self.share_of_length(s) * self.settings.paths as f32);
+        Some(self.learnt.lengths(numbers.collect(), self.settings.epsilon))
     }
 
     /// Draws candidates for an eye vertex at `point` that looks from the side of `wo`, and hands them to `connect`. Only a share `effort` of
@@ -171,8 +184,8 @@ impl Resampler {
             caches => (None, self.pmfs.draw(caches, u)?),
         };
         let scale = 1.0 / (probability * self.settings.paths as f32 * self.settings.samples as f32 * effort);
-        let seen = if self.settings.form.asks() { self.pmfs.seen(near.caches(), entry) } else { 0 };
-        Some(Candidate { proposal, near: (*near, seen), ..self.store.candidate(vertex, scale) })
+        let near = self.settings.form.asks().then(|| (*near, self.pmfs.seen(near.caches(), entry)));
+        Some(Candidate { proposal, near, ..self.store.candidate(vertex, scale) })
     }
 
     /// Far from all cache points: uniformly or, as a first stage would, by f_y/p.
@@ -196,10 +209,18 @@ impl Resampler {
 
     /// What must be saved to go on later, as bytes.
     pub fn state(&self) -> Vec<u8> {
-        let Some(caches) = &self.caches else { return vec![] };
-        let (sums, iterations) = caches.state();
+        let (sums, iterations) = match &self.caches {
+            Some(caches) => {
+                let (sums, iterations) = caches.state();
+                (sums.iter().flatten().copied().collect(), iterations)
+            }
+            None => (self.learnt.state(), 0),
+        };
+        if sums.is_empty() {
+            return vec![];
+        }
         let mut words = vec![iterations, self.seen[0], self.seen[1]];
-        words.extend(sums.iter().flatten().map(|s| s.to_bits()));
+        words.extend(sums.iter().map(|s| s.to_bits()));
         words.into_iter().flat_map(u64::to_le_bytes).collect()
     }
 }

@@ -5,7 +5,8 @@
 //! belongs to are left out, and eye vertices there draw uniformly (§4.4).
 
 use super::caches::place;
-use crate::math::Vec3;
+use super::store::direction_to;
+use crate::math::{Rgb, Vec3};
 use crate::path::Limits;
 use crate::prepared::PreparedScene;
 use crate::ray::offset::SegmentEnd;
@@ -103,6 +104,17 @@ impl Sites {
                 }
                 _ => 0,
             },
+        }
+    }
+
+    /// What of the flux at a light vertex at `p`, whose value for a direction is `value`, a site is reached by if nothing is in the way: ρ G at
+    /// records, 1/d² at nodes.
+    #[inline]
+    pub fn reached(&self, site: usize, p: Vec3, value: impl Fn(Vec3) -> Rgb) -> Rgb {
+        let at = self.ends[site].position();
+        match &self.normals {
+            Some(normals) => direction_to(p, at, normals[site]).map_or(Rgb::BLACK, |(to, spread)| value(to) * spread),
+            None => Rgb::grey(1.0 / p.distance_squared(at)),
         }
     }
 

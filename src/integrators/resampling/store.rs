@@ -197,7 +197,7 @@ impl LightStore {
             origin: None,
             number: Some(*number),
             proposal: None,
-            near: Default::default(),
+            near: None,
             scale,
         }
     }

@@ -1,7 +1,8 @@
-//! Proposals as techniques of their own: which cache points are near an eye vertex, how a light vertex sees them, and how one is drawn by.
+//! The cache points near a vertex, asked by weights: which light vertices they see, and what it is to draw by one of them alone.
 //!
-//! See `mis::proposals` for what weights make of it. All of a path's proposals must be functions of the path alone, so the shadow rays between
-//! cache points and vertices are traced at once and not queued.
+//! See `mis::proposals` for what weights make of it. A weight is wanted before its path's own shadow ray is sent, so the rays between
+//! cache points and vertices are traced at once and not queued. Those to a vertex that was drawn are not traced at all: the
+//! probabilities at the cache points know their answers.
 
 use super::caches::Caches;
 use super::pmfs::Choice;
@@ -35,6 +36,9 @@ impl Resampler {
     pub fn near(&self, point: &SurfacePoint, d: Vec3) -> Near {
         let n = side(point, d);
         let mut near = Near::default();
+        if let Some(sites) = &self.sites {
+            near.count = sites.find(point.p, n, self.settings.neighbours, &mut near.caches);
+        }
         if let Some(caches) = &self.caches {
             for i in caches.index.find(point.p, n).take(self.settings.neighbours) {
                 near.caches[near.count] = i;
@@ -47,17 +51,31 @@ impl Resampler {
     /// Bit `i` set: nothing is between cache point `i` of `near` and the vertex whose end of a shadow ray is `y`. These are the rays that
     /// the cache points' probabilities know.
     pub fn seen_by(&self, near: &Near, y: &SegmentEnd, tracer: &mut Tracer) -> u16 {
-        let Some(caches) = self.caches.as_ref().filter(|_| near.count > 0) else { return 0 };
         let mut packet = SegmentPacket::default();
-        near.caches().iter().for_each(|&c| packet.push(&segment(caches.end(c), y)));
+        for &c in near.caches() {
+            let end =
+                self.caches.as_ref().map(|caches| caches.end(c)).or(self.sites.as_ref().map(|sites| &sites.ends[c]));
+            end.into_iter().for_each(|end| packet.push(&segment(end, y)));
+        }
+        if packet.len == 0 {
+            return 0;
+        }
         !tracer.occluded_packet(&packet, RayKind::ShadowWeight)
     }
 
     /// The cache points `near` as seen from the vertex at `p` with the geometric normal `ng`, whose value for the direction to one is `value`
     /// and of which those with a bit in `seen` see it.
     pub fn proposals(&self, near: &Near, (p, ng): (Vec3, Vec3), seen: u16, value: impl Fn(Vec3) -> Rgb) -> Proposals {
-        let Some(caches) = &self.caches else { return Proposals::default() };
         let mut proposals = Proposals { count: near.count, ..Proposals::default() };
+        if let Some(sites) = &self.sites {
+            for (i, (proposal, &site)) in proposals.each.iter_mut().zip(near.caches()).enumerate() {
+                let open = Some(sites.reached(site, p, &value)).filter(|open| open.luminance().is_finite());
+                proposal.site = site as u32;
+                proposal.open = open.unwrap_or(Rgb::BLACK);
+                proposal.scattered = if seen >> i & 1 == 1 { proposal.open } else { Rgb::BLACK };
+            }
+        }
+        let Some(caches) = &self.caches else { return proposals };
         for (i, (proposal, &cache)) in proposals.each.iter_mut().zip(near.caches()).enumerate() {
             proposal.all = caches.all(cache);
             if let Some((towards, spread)) = caches.towards(cache, p) {

@@ -1,0 +1,119 @@
+//! Which light sub-paths an iteration traces, and what it takes from them: splats, and vertices to draw from.
+
+use super::light_path::{self, LensQueue};
+use super::worker::{Piece, Worker, splat};
+use super::{Bidirectional, CHOICE_STREAM, Found, LIGHT_PATHS_AT_ONCE, LIGHT_STREAM};
+use crate::integrators::resampling::store::{LightStore, Part};
+use crate::integrators::{Iteration, Replay};
+use crate::math::hash::HashRng;
+use crate::math::sampler::PathSampler;
+use crate::prepared::PreparedScene;
+use crate::ray::Tracer;
+use rayon::prelude::*;
+
+impl Bidirectional {
+    /// Pixel `number` has a light sub-path in this iteration.
+    pub(super) fn has_light_path(&self, iteration: &Iteration, number: u32) -> bool {
+        let effort = self.effort.light_image;
+        effort >= 1.0
+            || HashRng::new(iteration.seed, CHOICE_STREAM, u64::from(number), iteration.index).next_f32() < effort
+    }
+
+    /// Pixels have light sub-paths of their own.
+    pub(super) fn uses_light_paths(&self) -> bool {
+        self.connects || self.weigher.techniques.uses_light_image()
+    }
+
+    /// Light sub-paths of an iteration for the light image: one for every pixel of the full film, or fewer; where pixels choose whether
+    /// they have one, the number that is expected.
+    pub(super) fn light_paths(&self, scene: &PreparedScene) -> f32 {
+        let all = scene.film_size[0] as f32 * scene.film_size[1] as f32 * self.effort.light_image;
+        if self.resampler.is_some() { all.ceil() } else { all }
+    }
+
+    /// Random numbers of light sub-path `path`.
+    pub(in crate::integrators) fn light_sampler(&self, iteration: &Iteration, path: u32) -> PathSampler {
+        // The sub-paths of one iteration are points of one sequence: they are stratified among themselves.
+        PathSampler::new(iteration.seed, LIGHT_STREAM, iteration.index, u64::from(path))
+    }
+
+    /// One light sub-path and its splats.
+    pub(super) fn light_path(
+        &self,
+        iteration: &Iteration,
+        path: u32,
+        worker: &mut Worker,
+        tracer: &mut Tracer,
+        record: Option<&mut Replay>,
+        keep_vertices: bool,
+    ) {
+        let mut sampler = self.light_sampler(iteration, path);
+        let (splats, all) = (&mut worker.splats, &mut worker.found);
+        let mut found = |found: Found| {
+            splats.push(splat(found));
+            if self.wants(found.path) {
+                all.push(found);
+            }
+        };
+        let mut lens = LensQueue { queue: &mut worker.lens, found: &mut found, path };
+        light_path::trace(
+            self,
+            iteration.scene,
+            &mut sampler,
+            tracer,
+            &mut worker.light,
+            Some(&mut lens),
+            record,
+            keep_vertices,
+        );
+    }
+
+    /// All light sub-paths of an iteration whose eye vertices draw from the first `kept` of them, which are left in `store`.
+    pub(in crate::integrators) fn light_pass(
+        &self,
+        iteration: &Iteration,
+        kept: u32,
+        store: &mut LightStore,
+    ) -> Vec<Piece> {
+        let scene = iteration.scene;
+        let splat = match self.weigher.techniques.uses_light_image() {
+            true => self.light_paths(scene) as u32,
+            false => 0,
+        };
+        let all = splat.max(kept);
+        let one_piece = |worker: &mut Worker, (chunk, part): (usize, &mut Part)| {
+            let mut tracer = Tracer::new(&*scene.query);
+            let first = chunk as u32 * LIGHT_PATHS_AT_ONCE;
+            for path in first..all.min(first + LIGHT_PATHS_AT_ONCE) {
+                let keep = path < kept;
+                if path < splat {
+                    self.light_path(iteration, path, worker, &mut tracer, None, keep);
+                } else {
+                    let mut sampler = self.light_sampler(iteration, path);
+                    light_path::trace(self, scene, &mut sampler, &mut tracer, &mut worker.light, None, None, keep);
+                }
+                if keep {
+                    part.keep(path, &worker.light);
+                }
+            }
+            worker.finish(self, tracer)
+        };
+        let parts = store.begin(all.div_ceil(LIGHT_PATHS_AT_ONCE));
+        parts.par_iter_mut().enumerate().map_init(Worker::new, one_piece).collect()
+    }
+
+    /// Light sub-paths that belong to pixels outside of the window: only their splats matter.
+    pub(super) fn light_only(&self, iteration: &Iteration, paths: std::ops::Range<u32>, worker: &mut Worker) -> Piece {
+        let scene = iteration.scene;
+        let mut tracer = Tracer::new(&*scene.query);
+        let [x0, y0, width, height] = scene.window;
+        for path in paths {
+            let (x, y) = (path % scene.film_size[0], path / scene.film_size[0]);
+            let outside = x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height;
+            if outside && self.has_light_path(iteration, path) {
+                self.light_path(iteration, path, worker, &mut tracer, None, false);
+            }
+        }
+        worker.finish(self, tracer)
+    }
+}
