@@ -89,41 +89,34 @@ impl Resampled {
             true => (arriving * p.scattered).luminance() / p.all.scattered,
             false => uniform,
         };
-        let last = p_over((sum(&known) + uniform) / (near.len() + 1) as f32);
-        let m = 1.0 / self.paths;
-        let p_over_q = match self.second_stage {
-            None => last,
-            Some(m2) => p_over(uniform) / m2 + (1.0 - 1.0 / m2) * last,
-        };
-        1.0 / (m + (1.0 - m) * p_over_q)
+        self.factor_with(p_over(uniform), p_over((sum(&known) + uniform) / (near.len() + 1) as f32))
     }
 
     /// Factors of the proposals of a connection to a light vertex at which the light β_L = `arriving` is.
     pub fn shares(&self, arriving: Rgb, proposals: &Proposals) -> Shares {
         let near = &proposals.each[..proposals.count];
         let p_over = |q_over_p: f32| (1.0 / q_over_p).clamp(self.epsilon, f32::MAX);
-        let (m, choice) = (1.0 / self.paths, 1.0 / (near.len() + 1) as f32);
-        let share = |p_over_q: f32| choice / (m + (1.0 - m) * p_over_q);
+        let choice = 1.0 / (near.len() + 1) as f32;
         let unscattered: f32 = arriving.luminance() * near.iter().map(|p| p.unscattered).sum::<f32>();
         let all: f32 = near.iter().map(|p| p.all.unscattered).sum();
         let mut shares = [0.0; MOST + 1];
         for (own, p) in shares.iter_mut().zip(near) {
             let brings = (arriving * p.scattered).luminance();
             if brings > 0.0 {
-                let last = p_over(brings / p.all.scattered);
-                *own = share(match self.second_stage {
-                    None => last,
-                    Some(m2) => {
-                        let first = p_over(arriving.luminance() * p.unscattered / p.all.unscattered);
-                        first / m2 + (1.0 - 1.0 / m2) * last
-                    }
-                });
+                // Where nothing was known to arrive, whatever does is certain to be drawn.
+                let first = match p.all.unscattered > 0.0 {
+                    true => p_over(arriving.luminance() * p.unscattered / p.all.unscattered),
+                    false => self.epsilon,
+                };
+                *own = choice * self.factor_with(first, p_over(brings / p.all.scattered));
             }
         }
-        shares[near.len()] = share(match self.second_stage {
+        // What the first stage left is all that it draws from; with one stage, all vertices alike.
+        let uniform = match self.second_stage {
             Some(_) if all > 0.0 => p_over(unscattered / all),
             _ => self.vertices_per_path.clamp(self.epsilon, f32::MAX),
-        });
+        };
+        shares[near.len()] = choice * self.factor_with(uniform, uniform);
         Shares(shares)
     }
 }

@@ -115,10 +115,15 @@ impl Resampled {
             false => (uniform, uniform),
         };
         let missed = missed.max(self.doubt);
-        let last = (1.0 - missed) * p_over(known) + missed * p_over(unknown);
+        self.factor_with(p_over(uniform), (1.0 - missed) * p_over(known) + missed * p_over(unknown))
+    }
+
+    /// c where p/q is `first` for what the first of two stages aims at, and `last` for what the last (or only) one aims at.
+    #[inline]
+    pub(super) fn factor_with(&self, first: f32, last: f32) -> f32 {
         let p_over_q = match self.second_stage {
             None => last,
-            Some(m2) => p_over(uniform) / m2 + (1.0 - 1.0 / m2) * last,
+            Some(m2) => first / m2 + (1.0 - 1.0 / m2) * last,
         };
         let m = 1.0 / self.paths;
         1.0 / (m + (1.0 - m) * p_over_q)
