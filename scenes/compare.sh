@@ -55,7 +55,9 @@ for figure in ${FIGURES:-}; do
         add two-stage:weights=balance two-stage:weights=ris two-stage:weights=two-stage
         ;;
     proposals)
-        for method in ris two-stage; do add $method $method:proposals=mixture $method:proposals=asked $method:proposals=split $method:target=radiance $method:metric=plain; done
+        for method in ris two-stage; do
+            for form in mixture asked split mixture,target=radiance mixture,metric=plain; do add "$method:proposals=$form"; done
+        done
         ;;
     first-stage) for m in 1000 10000 100000; do add "two-stage:paths=$m"; done ;;
     last-stage) for m in 50 100 200 400 800; do add "two-stage:second_stage=$m"; done ;;
