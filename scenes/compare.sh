@@ -55,8 +55,8 @@ for figure in ${FIGURES:-}; do
         add two-stage:weights=balance two-stage:weights=ris two-stage:weights=two-stage
         ;;
     proposals)
-        for method in ris two-stage; do
-            for form in mixture asked split mixture,target=radiance mixture,metric=plain; do add "$method:proposals=$form"; done
+        for base in ris two-stage; do
+            for form in mixture asked split mixture,target=radiance mixture,metric=plain; do add "$base:proposals=$form"; done
         done
         ;;
     first-stage) for m in 1000 10000 100000; do add "two-stage:paths=$m"; done ;;
