@@ -65,14 +65,17 @@ fn moments(renders: &[Vec<f64>]) -> Vec<(f64, f64)> {
 fn each_technique_alone_makes_the_same_picture() {
     let few: &[(&str, &str)] = &[("paths", "7"), ("caches", "50000")];
     let many: &[(&str, &str)] = &[("paths", "300"), ("caches", "50000"), ("samples", "2")];
-    // By themselves, techniques that draw by cache points of any surface hang on few lucky paths: here only those that face alike.
     let two: &[(&str, &str)] =
         &[("paths", "100"), ("caches", "50000"), ("second_stage", "16"), ("proposals", "mixture")];
+    // Cache points of any surface may not see what a place sees: what the others draw then is a rare and bright path, and a larger
+    // second stage has more of them.
+    let asked: &[(&str, &str)] = &[("paths", "100"), ("caches", "50000"), ("second_stage", "100")];
     for (spec, params) in [
         (&bdpt::SPEC, &[][..]),
         (&resampling::RIS, few),
         (&resampling::PCBPT, many),
         (&resampling::TWO_STAGE, two),
+        (&resampling::TWO_STAGE, asked),
         (&importance::IC_BDPT, &[("paths", "100"), ("records", "50000")]),
     ] {
         techniques_agree(spec, params);

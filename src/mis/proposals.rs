@@ -77,7 +77,7 @@ impl Resampled {
             return self.shares(arriving, proposals).sum();
         }
         let near = &proposals.each[..proposals.count];
-        let p_over = |q_over_p: f32| (1.0 / q_over_p).clamp(self.epsilon, f32::MAX);
+        let p_over = |q_over_p| self.p_over(q_over_p);
         let sum = |of: &dyn Fn(&Proposal) -> f32| near.iter().map(of).sum::<f32>();
         let all = sum(&|p| p.all.unscattered);
         let uniform = match self.second_stage {
@@ -95,7 +95,7 @@ impl Resampled {
     /// Factors of the proposals of a connection to a light vertex at which the light β_L = `arriving` is.
     pub fn shares(&self, arriving: Rgb, proposals: &Proposals) -> Shares {
         let near = &proposals.each[..proposals.count];
-        let p_over = |q_over_p: f32| (1.0 / q_over_p).clamp(self.epsilon, f32::MAX);
+        let p_over = |q_over_p| self.p_over(q_over_p);
         let choice = 1.0 / (near.len() + 1) as f32;
         let unscattered: f32 = arriving.luminance() * near.iter().map(|p| p.unscattered).sum::<f32>();
         let all: f32 = near.iter().map(|p| p.all.unscattered).sum();
@@ -124,16 +124,9 @@ impl Resampled {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mis::resampled::tests::ONE_STAGE;
 
-    const RESAMPLED: Resampled = Resampled {
-        paths: 200.0,
-        second_stage: None,
-        epsilon: 1e-3,
-        doubt: 0.0,
-        uniform: 0.25,
-        vertices_per_path: 3.0,
-        form: Form::Split,
-    };
+    const RESAMPLED: Resampled = Resampled { form: Form::Split, ..ONE_STAGE };
 
     fn near(scattered: [f32; MOST]) -> Proposals {
         let all = Targets { scattered: 2.0, unscattered: 5.0 };

@@ -101,7 +101,7 @@ impl Resampled {
         let blur = if blur2 > 0.0 { distance2 / (distance2 + blur2) } else { 1.0 };
         let brings = Targets { scattered: brings.scattered * blur, unscattered: brings.unscattered * blur };
         let by_number = 1.0 / self.vertices_per_path;
-        let p_over = |q_over_p: f32| (1.0 / q_over_p).clamp(self.epsilon, f32::MAX);
+        let p_over = |q_over_p| self.p_over(q_over_p);
         // The share that is spread over everything; where no light is known of, all of the mixture is.
         let uniform = match self.second_stage {
             Some(_) if all.unscattered > 0.0 => brings.unscattered / all.unscattered,
@@ -118,6 +118,12 @@ impl Resampled {
         self.factor_with(p_over(uniform), (1.0 - missed) * p_over(known) + missed * p_over(unknown))
     }
 
+    /// p/q, as far as weights believe it.
+    #[inline]
+    pub(super) fn p_over(&self, q_over_p: f32) -> f32 {
+        (1.0 / q_over_p).clamp(self.epsilon, f32::MAX)
+    }
+
     /// c where p/q is `first` for what the first of two stages aims at, and `last` for what the last (or only) one aims at.
     #[inline]
     pub(super) fn factor_with(&self, first: f32, last: f32) -> f32 {
@@ -131,11 +137,11 @@ impl Resampled {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ONE_STAGE: Resampled = Resampled {
+    pub const ONE_STAGE: Resampled = Resampled {
         paths: 200.0,
         second_stage: None,
         epsilon: 1e-3,

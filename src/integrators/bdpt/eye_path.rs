@@ -334,6 +334,7 @@ impl EyeHooks<'_, '_> {
                 if let Some(proposal) = to.proposal {
                     let shares = resampled.shares(light.throughput, &proposals);
                     raw *= shares.of(proposal) / shares.sum();
+                    return shares.sum();
                 }
                 return weigher.asked(&resampled, light.throughput, &proposals, light.length());
             }

@@ -81,7 +81,8 @@ impl Bidirectional {
             false => 0,
         };
         let all = splat.max(kept);
-        let one_piece = |worker: &mut Worker, (chunk, part): (usize, &mut Part)| {
+        let one_piece = |worker: &mut Worker, (chunk, part): (usize, Option<&mut Part>)| {
+            let mut part = part;
             let mut tracer = Tracer::new(&*scene.query);
             let first = chunk as u32 * LIGHT_PATHS_AT_ONCE;
             for path in first..all.min(first + LIGHT_PATHS_AT_ONCE) {
@@ -92,14 +93,17 @@ impl Bidirectional {
                     let mut sampler = self.light_sampler(iteration, path);
                     light_path::trace(self, scene, &mut sampler, &mut tracer, &mut worker.light, None, None, keep);
                 }
-                if keep {
+                if let (true, Some(part)) = (keep, part.as_deref_mut()) {
                     part.keep(path, &worker.light);
                 }
             }
             worker.finish(self, tracer)
         };
-        let parts = store.begin(all.div_ceil(LIGHT_PATHS_AT_ONCE));
-        parts.par_iter_mut().enumerate().map_init(Worker::new, one_piece).collect()
+        // Of the pieces, which may be very many, only the first leave something in the store.
+        let (pieces, kept_pieces) = (all.div_ceil(LIGHT_PATHS_AT_ONCE), kept.div_ceil(LIGHT_PATHS_AT_ONCE));
+        let kept_parts = store.begin(kept_pieces).par_iter_mut().map(Some);
+        let others = (kept_pieces..pieces).into_par_iter().map(|_| None);
+        kept_parts.chain(others).enumerate().map_init(Worker::new, one_piece).collect()
     }
 
     /// Light sub-paths that belong to pixels outside of the window: only their splats matter.

@@ -81,12 +81,12 @@ const EPSILON: ParamSpec = ParamSpec {
 };
 const DOUBT: ParamSpec = ParamSpec {
     name: "doubt",
-    about: "smallest share of light, in millionths, of which weights assume that the cache points around do not know it",
+    about: "smallest share of light, in millionths, of which weights assume that the cache points around do not know it (proposals=mixture)",
     default: ParamDefault::Int(20_000, 0, 1_000_000),
 };
 const TRUST: ParamSpec = ParamSpec {
     name: "trust",
-    about: "what weights assume of cache points: learned: that they know as much of a place's light as they turned out to know of each other's; full: all of it, but for `doubt`",
+    about: "what weights assume of cache points (proposals=mixture): learned: that they know as much of a place's light as they turned out to know of each other's; full: all of it, but for `doubt`",
     default: ParamDefault::Choice("learned", &["learned", "full"]),
 };
 const METRIC: ParamSpec = ParamSpec {
@@ -104,7 +104,7 @@ const TARGET: ParamSpec = ParamSpec {
 const fn proposals(default: &'static str) -> ParamSpec {
     ParamSpec {
         name: "proposals",
-        about: "mixture: eye vertices draw from one mixture of the probabilities around and a uniform share, of which weights assume that they are those of the place itself; asked: the same, but weights ask the cache points around what these see; split: each of these probabilities is a technique with a weight of its own, as published (asked and split: metric=plain, target=irradiance; not with weights=balance)",
+        about: "mixture: eye vertices draw from one mixture of the probabilities around and a uniform share, of which weights assume that they are those of the place itself; asked: the same, but weights ask the cache points around what these see; split: each of these probabilities is a technique with a weight of its own, as published (asked and split take metric=plain, split target=irradiance; all that weights=balance knows is the mixture)",
         default: ParamDefault::Choice(default, &["mixture", "asked", "split"]),
     }
 }
@@ -187,7 +187,7 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
         trust: params.choice("trust") == "full",
         // Which cache points a weight asks must be the same from whichever side a technique looks at a surface.
         metric: if params.choice("metric") == "plain" || form.asks() { Metric::Plain } else { Metric::Facing },
-        radiance: params.choice("target") == "radiance" && !form.asks(),
+        radiance: params.choice("target") == "radiance" && form != Form::Split,
         form,
         weights,
     };

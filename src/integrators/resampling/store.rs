@@ -118,8 +118,9 @@ impl LightStore {
         (replay.light, path.origin)
     }
 
-    /// Forgets everything but its memory; what there will be comes into so many parts.
+    /// Forgets everything but its memory; what there will be comes into so many parts, of which vertices can number 2¹⁶.
     pub fn begin(&mut self, parts: u32) -> &mut [Part] {
+        debug_assert!(parts <= 1 << 16, "{parts}");
         self.vertices.clear();
         self.parts.resize_with(parts as usize, Part::default);
         self.parts.iter_mut().for_each(Part::clear);
