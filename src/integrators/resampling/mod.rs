@@ -52,7 +52,7 @@ const KEEP: ParamSpec = ParamSpec {
 };
 const FIRST_STAGE: ParamSpec = ParamSpec {
     name: "paths",
-    about: "M1, light sub-paths per iteration for the first stage; 0: 10000, or the number of pixels if that is less",
+    about: "M1, light sub-paths per iteration for the first stage; 0: as many as are worth their time beside the eye sub-paths",
     default: ParamDefault::Int(0, 0, 10_000_000),
 };
 const SECOND_STAGE: ParamSpec = ParamSpec {

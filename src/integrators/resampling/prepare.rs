@@ -9,14 +9,32 @@ use super::store::LightStore;
 use super::{Scheme, Settings};
 use crate::integrators::Iteration;
 use crate::integrators::bdpt::{Bidirectional, Piece};
-use crate::ray::{Phases, RayStats};
+use crate::ray::{Phases, RayKind, RayStats};
 
 /// Sets of light sub-paths that estimate normalisations before the first iteration.
 const WARM_UP: u64 = 4;
-/// Light sub-paths to draw from where nothing else is asked for.
-const MOST_BY_DEFAULT: u32 = 10_000;
+/// √(B/A) of [`best_number`].
+const WORTH: f64 = 36.0;
+/// What a ray of an eye sub-path costs with all that belongs to it, and a light vertex besides its ray, in rays of light sub-paths.
+const EYE_COST: f64 = 3.5;
+const VERTEX_COST: f64 = 2.0;
+/// Bounds of what it finds, unless the picture has fewer pixels.
+const BY_COST: [f64; 2] = [1000.0, 100_000.0];
 /// Light sub-paths of one of these sets, at most.
 const WARM_UP_PATHS: u32 = 4000;
+
+/// M₁ by what sub-paths cost. The variance of a picture falls with it as A + B/M₁ while the cost of an iteration grows as P e + M₁ l, where
+/// each of P eye sub-paths costs e and a light sub-path l. Their product is least at M₁ = √(B/A · P e/l).
+fn best_number(pixels: f64, eye: f64, light: f64) -> u32 {
+    let best = WORTH * (pixels * eye / light.max(f64::MIN_POSITIVE)).sqrt();
+    // Where light sub-paths end at once, or nothing is known of them, the number is a bound's.
+    best.clamp(BY_COST[0], BY_COST[1]).min(pixels).max(1.0) as u32
+}
+
+/// Rays of some kinds.
+fn rays(stats: &RayStats, kinds: &[RayKind]) -> f64 {
+    kinds.iter().map(|k| stats.kinds[*k as usize].rays as f64).sum()
+}
 
 impl Bidirectional {
     /// Connections are resampled from now on.
@@ -34,10 +52,6 @@ impl Bidirectional {
     fn prepare_caches(&mut self, iteration: &Iteration, stats: &mut RayStats) {
         let scene = iteration.scene;
         let Some(resampler) = &mut self.resampler else { return };
-        if resampler.settings.paths == 0 {
-            let [width, height] = scene.film_size;
-            resampler.settings.paths = width.saturating_mul(height).min(MOST_BY_DEFAULT);
-        }
         let Settings { scheme, cache_fraction, second_stage, paths, .. } = resampler.settings;
         let clusters = second_stage.map(|m2| m2 as usize);
         if !matches!(scheme, Scheme::Caches) {
@@ -60,11 +74,15 @@ impl Bidirectional {
         }
         let (mut caches, s) = Caches::new(scene, iteration.seed, &resampler.settings, &self.weigher.eye_limits);
         stats.merge(&s);
+        let pixels = f64::from(scene.film_size[0]) * f64::from(scene.film_size[1]);
+        let eye_rays = rays(&s, &[RayKind::Cache]) / (pixels * cache_fraction).max(1.0);
+        let warm_up_paths = if paths > 0 { paths } else { pixels as u32 }.min(WARM_UP_PATHS);
         let first = Iteration { index: 0, ..*iteration };
-        let (mut seen, mut pmfs) = ([0, 0], Pmfs::default());
+        let (mut seen, mut pmfs, mut light_rays) = ([0, 0], Pmfs::default(), 0.0);
         for set in 1..=WARM_UP {
-            let (store, s) = LightStore::trace(self, &first, (paths.min(WARM_UP_PATHS), set), clusters.is_some());
+            let (store, s) = LightStore::trace(self, &first, (warm_up_paths, set), clusters.is_some());
             stats.merge(&s);
+            light_rays += rays(&s, &[RayKind::Light, RayKind::LightBounce]);
             // Random numbers of iterations count from zero up, those of warm-ups from the top down.
             stats.merge(&pmfs.find(scene, &caches, &store, clusters, (iteration.seed, u64::MAX - set)));
             caches.learn(pmfs.found());
@@ -73,6 +91,10 @@ impl Bidirectional {
         if let Some(resampler) = &mut self.resampler {
             resampler.seen = seen;
             resampler.caches = Some(caches);
+            if resampler.settings.paths == 0 {
+                let light = (light_rays + VERTEX_COST * seen[0] as f64) / seen[1].max(1) as f64;
+                resampler.settings.paths = best_number(pixels, EYE_COST * eye_rays, light);
+            }
         }
     }
 
@@ -188,5 +210,27 @@ impl Bidirectional {
             }
             None => false,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_number_has_the_least_product_of_variance_and_cost() {
+        let (pixels, eye, light) = (1e5, 5.0, 8.0);
+        let product = |m: f64| (1.0 + WORTH * WORTH / m) * (pixels * eye + m * light);
+        let best = f64::from(best_number(pixels, eye, light));
+        assert!((BY_COST[0]..BY_COST[1]).contains(&best));
+        assert!([0.9, 1.1].iter().all(|f| product(best) < product(best * f)), "{best}");
+    }
+
+    #[test]
+    fn it_has_bounds_whatever_is_known() {
+        assert_eq!(best_number(40.0, 5.0, 8.0), 40);
+        assert_eq!(best_number(2000.0, 0.0, 8.0), 1000);
+        assert_eq!(best_number(1e9, 5.0, 0.0), 100_000);
+        assert_eq!(best_number(1e9, 0.0, 0.0), 1000);
     }
 }

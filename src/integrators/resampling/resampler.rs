@@ -202,7 +202,10 @@ impl Resampler {
     /// What there is to draw by, for people.
     pub fn note(&self) -> Option<String> {
         match (&self.caches, &self.sites) {
-            (Some(caches), _) => Some(format!("{} cache points in {} groups", caches.index.len(), caches.groups.len())),
+            (Some(caches), _) => {
+                let (points, groups, paths) = (caches.index.len(), caches.groups.len(), self.settings.paths);
+                Some(format!("{points} cache points in {groups} groups, {paths} light sub-paths"))
+            }
             (_, sites) => sites.as_ref().map(Sites::note),
         }
     }
