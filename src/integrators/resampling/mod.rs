@@ -26,6 +26,7 @@ pub(in crate::integrators) mod near;
 mod pmfs;
 mod combined;
 mod learnt;
+mod places;
 mod prepare;
 pub(in crate::integrators) mod resampler;
 mod sites;

@@ -5,7 +5,8 @@
 //! probabilities at the cache points know their answers.
 
 use super::caches::Caches;
-use super::pmfs::Choice;
+use super::places::Places;
+use super::pmfs::{Choice, Pmfs};
 use super::resampler::{Resampler, side};
 use super::store::direction_to;
 use crate::integrators::bdpt::light_path::LightVertex;
@@ -36,14 +37,16 @@ impl Resampler {
     pub fn near(&self, point: &SurfacePoint, d: Vec3) -> Near {
         let n = side(point, d);
         let mut near = Near::default();
-        if let Some(sites) = &self.sites {
-            near.count = sites.find(point.p, n, self.settings.neighbours, &mut near.caches);
-        }
-        if let Some(caches) = &self.caches {
-            for i in caches.index.find(point.p, n).take(self.settings.neighbours) {
-                near.caches[near.count] = i;
-                near.count += 1;
+        let most = self.settings.neighbours;
+        match &self.places {
+            Places::None => {}
+            Places::Caches(at) => {
+                for i in at.caches.index.find(point.p, n).take(most) {
+                    near.caches[near.count] = i;
+                    near.count += 1;
+                }
             }
+            Places::Sites(at) => near.count = at.sites.find(point.p, n, most, &mut near.caches),
         }
         near
     }
@@ -53,9 +56,7 @@ impl Resampler {
     pub fn seen_by(&self, near: &Near, y: &SegmentEnd, tracer: &mut Tracer) -> u16 {
         let mut packet = SegmentPacket::default();
         for &c in near.caches() {
-            let end =
-                self.caches.as_ref().map(|caches| caches.end(c)).or(self.sites.as_ref().map(|sites| &sites.ends[c]));
-            end.into_iter().for_each(|end| packet.push(&segment(end, y)));
+            self.places.end(c).into_iter().for_each(|end| packet.push(&segment(end, y)));
         }
         if packet.len == 0 {
             return 0;
@@ -67,22 +68,25 @@ impl Resampler {
     /// and of which those with a bit in `seen` see it.
     pub fn proposals(&self, near: &Near, (p, ng): (Vec3, Vec3), seen: u16, value: impl Fn(Vec3) -> Rgb) -> Proposals {
         let mut proposals = Proposals { count: near.count, ..Proposals::default() };
-        if let Some(sites) = &self.sites {
-            for (i, (proposal, &site)) in proposals.each.iter_mut().zip(near.caches()).enumerate() {
-                let open = Some(sites.reached(site, p, &value)).filter(|open| open.luminance().is_finite());
-                proposal.site = site as u32;
-                proposal.open = open.unwrap_or(Rgb::BLACK);
-                proposal.scattered = if seen >> i & 1 == 1 { proposal.open } else { Rgb::BLACK };
-            }
-        }
-        let Some(caches) = &self.caches else { return proposals };
-        for (i, (proposal, &cache)) in proposals.each.iter_mut().zip(near.caches()).enumerate() {
-            proposal.all = caches.all(cache);
-            if let Some((towards, spread)) = caches.towards(cache, p) {
-                let scattered = if seen >> i & 1 == 1 { value(towards) * spread } else { Rgb::BLACK };
-                let unscattered = ng.dot(towards).abs() * spread;
-                if scattered.luminance().is_finite() && unscattered.is_finite() {
-                    *proposal = Proposal { scattered, unscattered, ..*proposal };
+        for (i, (proposal, &place)) in proposals.each.iter_mut().zip(near.caches()).enumerate() {
+            let sees = seen >> i & 1 == 1;
+            match &self.places {
+                Places::None => {}
+                Places::Caches(at) => {
+                    proposal.all = at.caches.all(place);
+                    if let Some((towards, spread)) = at.caches.towards(place, p) {
+                        let scattered = if sees { value(towards) * spread } else { Rgb::BLACK };
+                        let unscattered = ng.dot(towards).abs() * spread;
+                        if scattered.luminance().is_finite() && unscattered.is_finite() {
+                            *proposal = Proposal { scattered, unscattered, ..*proposal };
+                        }
+                    }
+                }
+                Places::Sites(at) => {
+                    let open = Some(at.sites.reached(place, p, &value)).filter(|open| open.luminance().is_finite());
+                    proposal.site = place as u32;
+                    proposal.open = open.unwrap_or(Rgb::BLACK);
+                    proposal.scattered = if sees { proposal.open } else { Rgb::BLACK };
                 }
             }
         }
@@ -96,13 +100,13 @@ impl Resampler {
 
     /// Chooses a proposal, one of the cache points `near` or the virtual one, and draws by it alone: the number of the proposal, and what was
     /// drawn with what probability, the choice of the proposal included. `None` where there is nothing to draw.
-    pub(super) fn draw_split(&self, near: &Near, u: [f32; 2]) -> Option<(usize, Choice)> {
+    pub(super) fn draw_split(&self, pmfs: &Pmfs, near: &Near, u: [f32; 2]) -> Option<(usize, Choice)> {
         let n = near.count;
         let proposal = ((u[0] * (n + 1) as f32) as usize).min(n);
         let choice = match near.caches().get(proposal) {
-            Some(&cache) => self.pmfs.draw_at(cache, u[1])?,
+            Some(&cache) => pmfs.draw_at(cache, u[1])?,
             None => match near.caches().first() {
-                Some(&cache) => self.pmfs.draw_uniformly(cache, u[1])?,
+                Some(&cache) => pmfs.draw_uniformly(cache, u[1])?,
                 None => self.draw_anything(u[1])?,
             },
         };

@@ -2,6 +2,8 @@
 
 use super::caches::Caches;
 use super::combined::CombinedPmfs;
+use super::learnt::Learnt;
+use super::places::{AtCaches, AtSites, Places};
 use super::pmfs::Pmfs;
 use super::resampler::Resampler;
 use super::sites::Sites;
@@ -48,37 +50,42 @@ impl Bidirectional {
         self.resampler.is_some() && self.weigher.techniques.uses_connections() && self.weigher.eye_limits.max_edges >= 3
     }
 
-    /// Cache points and first normalisations, once; they are functions of scene and seed alone.
-    fn prepare_caches(&mut self, iteration: &Iteration, stats: &mut RayStats) {
-        let scene = iteration.scene;
-        let Some(resampler) = &mut self.resampler else { return };
-        let Settings { scheme, cache_fraction, second_stage, paths, .. } = resampler.settings;
-        let clusters = second_stage.map(|m2| m2 as usize);
-        if !matches!(scheme, Scheme::Caches) {
-            let (sites, s) = match scheme {
-                Scheme::Skeleton { cells, acceptance } => {
-                    Sites::nodes(scene, iteration.seed, cells, acceptance, &self.weigher.eye_limits)
-                }
-                _ => Sites::records(scene, iteration.seed, cache_fraction, &self.weigher.eye_limits),
-            };
-            stats.merge(&s);
-            resampler.sites = Some(sites);
-            if scheme != (Scheme::Records { pooled: true }) {
-                let first = Iteration { index: 0, ..*iteration };
-                let (store, s) = LightStore::trace(self, &first, (WARM_UP_PATHS, 1), false);
-                stats.merge(&s);
-                self.know_lengths(store.lengths(), WARM_UP_PATHS);
+    /// Places to know light at and what is found there before the first iteration, once; they are functions of scene and seed alone.
+    fn place(&mut self, iteration: &Iteration, stats: &mut RayStats) {
+        let Some(resampler) = &self.resampler else { return };
+        let (settings, mut seen) = (resampler.settings, [0; 2]);
+        let (places, paths) = match settings.scheme {
+            Scheme::Caches => {
+                let (at, paths) = self.place_caches(iteration, &settings, &mut seen, stats);
+                (Places::Caches(Box::new(at)), paths)
             }
-            self.prepare_sites(iteration, stats);
-            return;
+            Scheme::Records { .. } | Scheme::Skeleton { .. } => {
+                (Places::Sites(Box::new(self.place_sites(iteration, &settings, stats))), settings.paths)
+            }
+        };
+        if let Some(resampler) = &mut self.resampler {
+            (resampler.places, resampler.seen, resampler.settings.paths) = (places, seen, paths);
         }
-        let (mut caches, s) = Caches::new(scene, iteration.seed, &resampler.settings, &self.weigher.eye_limits);
+    }
+
+    /// Cache points with first normalisations, the number of light sub-paths of iterations and, in `seen`, what has been seen of light sub-paths.
+    fn place_caches(
+        &self,
+        iteration: &Iteration,
+        settings: &Settings,
+        seen: &mut [u64; 2],
+        stats: &mut RayStats,
+    ) -> (AtCaches, u32) {
+        let scene = iteration.scene;
+        let &Settings { cache_fraction, second_stage, paths, .. } = settings;
+        let clusters = second_stage.map(|m2| m2 as usize);
+        let (mut caches, s) = Caches::new(scene, iteration.seed, settings, &self.weigher.eye_limits);
         stats.merge(&s);
         let pixels = f64::from(scene.film_size[0]) * f64::from(scene.film_size[1]);
         let eye_rays = rays(&s, &[RayKind::Cache]) / (pixels * cache_fraction).max(1.0);
         let warm_up_paths = if paths > 0 { paths } else { pixels as u32 }.min(WARM_UP_PATHS);
         let first = Iteration { index: 0, ..*iteration };
-        let (mut seen, mut pmfs, mut light_rays) = ([0, 0], Pmfs::default(), 0.0);
+        let (mut pmfs, mut light_rays) = (Pmfs::default(), 0.0);
         for set in 1..=WARM_UP {
             let (store, s) = LightStore::trace(self, &first, (warm_up_paths, set), clusters.is_some());
             stats.merge(&s);
@@ -86,51 +93,53 @@ impl Bidirectional {
             // Random numbers of iterations count from zero up, those of warm-ups from the top down.
             stats.merge(&pmfs.find(scene, &caches, &store, clusters, (iteration.seed, u64::MAX - set)));
             caches.learn(pmfs.found());
-            seen = [seen[0] + store.len() as u64, seen[1] + u64::from(store.paths_traced)];
+            *seen = [seen[0] + store.len() as u64, seen[1] + u64::from(store.paths_traced)];
         }
-        if let Some(resampler) = &mut self.resampler {
-            resampler.seen = seen;
-            resampler.caches = Some(caches);
-            if resampler.settings.paths == 0 {
+        let paths = match paths {
+            0 => {
                 let light = (light_rays + VERTEX_COST * seen[0] as f64) / seen[1].max(1) as f64;
-                resampler.settings.paths = best_number(pixels, EYE_COST * eye_rays, light);
+                best_number(pixels, EYE_COST * eye_rays, light)
             }
-        }
+            _ => paths,
+        };
+        (AtCaches { caches, pmfs: Pmfs::default() }, paths)
     }
 
-    /// What sites find before the first iteration, if weights ask them.
-    fn prepare_sites(&mut self, iteration: &Iteration, stats: &mut RayStats) {
-        let Some(Settings { form, paths, .. }) = self.resampler.as_ref().map(|r| r.settings) else { return };
-        if !form.asks() {
-            return;
-        }
+    /// Sites of importance caching with what they find before the first iteration, if weights ask them.
+    fn place_sites(&self, iteration: &Iteration, settings: &Settings, stats: &mut RayStats) -> AtSites {
+        let (scene, limits) = (iteration.scene, &self.weigher.eye_limits);
+        let (sites, s) = match settings.scheme {
+            Scheme::Skeleton { cells, acceptance } => Sites::nodes(scene, iteration.seed, cells, acceptance, limits),
+            _ => Sites::records(scene, iteration.seed, settings.cache_fraction, limits),
+        };
+        stats.merge(&s);
+        let (mut learnt, mut lengths) = (Learnt::default(), vec![]);
         let first = Iteration { index: 0, ..*iteration };
-        for set in 1..=WARM_UP {
-            let (store, s) = LightStore::trace(self, &first, (paths.min(WARM_UP_PATHS), set), false);
+        if settings.scheme != (Scheme::Records { pooled: true }) {
+            let (store, s) = LightStore::trace(self, &first, (WARM_UP_PATHS, 1), false);
             stats.merge(&s);
-            let mut combined = CombinedPmfs::default();
-            if let Some(resampler) = &mut self.resampler
-                && let Some(sites) = &resampler.sites
-            {
-                stats.merge(&combined.find(iteration.scene, sites, &store, false));
-                resampler.learnt.learn(&combined);
+            // A length that was not met is not impossible.
+            lengths = store.lengths().iter().map(|&n| (n as f32).max(0.5) / WARM_UP_PATHS as f32).collect();
+        }
+        if settings.form.asks() {
+            for set in 1..=WARM_UP {
+                let paths = settings.paths.min(WARM_UP_PATHS);
+                let (store, s) = LightStore::trace(self, &first, (paths, set), false);
+                stats.merge(&s);
+                let mut combined = CombinedPmfs::default();
+                stats.merge(&combined.find(scene, &sites, &store, false));
+                learnt.learn(&combined);
             }
         }
-    }
-
-    /// How many of `paths` light sub-paths have a vertex number s, by s.
-    fn know_lengths(&mut self, counts: Vec<u32>, paths: u32) {
-        let Some(resampler) = &mut self.resampler else { return };
-        // A length that was not met is not impossible.
-        resampler.lengths = counts.iter().map(|&n| (n as f32).max(0.5) / paths as f32).collect();
+        AtSites { sites, combined: CombinedPmfs::default(), learnt, lengths }
     }
 
     /// Gets the candidates of an iteration ready. All its light sub-paths are traced, and what the lens sees of them is brought back:
     /// those to draw from are the first of them.
     pub(in crate::integrators) fn prepare_resampling(&mut self, iteration: &Iteration) -> (RayStats, Vec<Piece>) {
         let (mut stats, mut phases) = (RayStats::default(), Phases::default());
-        if self.resampler.as_ref().is_some_and(|r| r.caches.is_none() && r.sites.is_none()) {
-            phases.time("placing caches", || self.prepare_caches(iteration, &mut stats));
+        if self.resampler.as_ref().is_some_and(|r| matches!(r.places, Places::None)) {
+            phases.time("placing caches", || self.place(iteration, &mut stats));
         }
         let Some(resampler) = &mut self.resampler else { return (stats, vec![]) };
         (self.weigher.resampled, self.weigher.lengths) = (resampler.resampled(), resampler.by_length());
@@ -140,18 +149,18 @@ impl Bidirectional {
         phases.time("light tree", || store.finish(paths, second_stage.is_some()));
         let Some(resampler) = &mut self.resampler else { return (stats, pieces) };
         resampler.store = store;
-        if let Some(sites) = &resampler.sites {
-            let pooled = matches!(resampler.settings.scheme, Scheme::Records { pooled: true });
-            let (combined, store) = (&mut resampler.combined, &resampler.store);
-            stats.merge(&phases.time("pmfs", || combined.find(iteration.scene, sites, store, pooled)));
-        }
-        if let Some(caches) = &resampler.caches {
-            let (pmfs, store) = (&mut resampler.pmfs, &resampler.store);
-            let random = (iteration.seed, iteration.index);
-            stats.merge(&phases.time("pmfs", || {
-                pmfs.find(iteration.scene, caches, store, second_stage.map(|m2| m2 as usize), random)
-            }));
-        }
+        let (scene, store) = (iteration.scene, &resampler.store);
+        stats.merge(&phases.time("pmfs", || match &mut resampler.places {
+            Places::None => RayStats::default(),
+            Places::Caches(at) => {
+                let random = (iteration.seed, iteration.index);
+                at.pmfs.find(scene, &at.caches, store, second_stage.map(|m2| m2 as usize), random)
+            }
+            Places::Sites(at) => {
+                let pooled = matches!(resampler.settings.scheme, Scheme::Records { pooled: true });
+                at.combined.find(scene, &at.sites, store, pooled)
+            }
+        }));
         stats.phases.merge(&phases);
         (stats, pieces)
     }
@@ -181,13 +190,14 @@ impl Bidirectional {
     /// The iteration is over: what it found may now be known.
     pub(in crate::integrators) fn learn(&mut self) {
         let Some(resampler) = &mut self.resampler else { return };
-        if resampler.sites.is_some() && resampler.settings.form.asks() {
-            resampler.learnt.learn(&resampler.combined);
-        }
-        if let Some(caches) = &mut resampler.caches {
-            caches.learn(resampler.pmfs.found());
-            resampler.seen[0] += resampler.store.len() as u64;
-            resampler.seen[1] += u64::from(resampler.store.paths_traced);
+        match &mut resampler.places {
+            Places::Caches(at) => {
+                at.caches.learn(at.pmfs.found());
+                resampler.seen[0] += resampler.store.len() as u64;
+                resampler.seen[1] += u64::from(resampler.store.paths_traced);
+            }
+            Places::Sites(at) if resampler.settings.form.asks() => at.learnt.learn(&at.combined),
+            Places::Sites(_) | Places::None => {}
         }
     }
 
@@ -197,19 +207,11 @@ impl Bidirectional {
         let (Some(iterations), Some(vertices), Some(paths)) = (words.next(), words.next(), words.next()) else {
             return bytes.is_empty();
         };
-        self.prepare_caches(iteration, &mut RayStats::default());
-        let words: Vec<f64> = words.map(f64::from_bits).collect();
-        let (sums, rest) = words.as_chunks::<3>();
-        match &mut self.resampler {
-            Some(resampler) => {
-                resampler.seen = [vertices, paths];
-                if resampler.sites.is_some() {
-                    return resampler.learnt.restore(&words);
-                }
-                rest.is_empty() && resampler.caches.as_mut().is_some_and(|c| c.restore(sums.to_vec(), iterations))
-            }
-            None => false,
-        }
+        self.place(iteration, &mut RayStats::default());
+        let sums: Vec<f64> = words.map(f64::from_bits).collect();
+        let Some(resampler) = &mut self.resampler else { return false };
+        resampler.seen = [vertices, paths];
+        resampler.places.restore(&sums, iterations)
     }
 }
 

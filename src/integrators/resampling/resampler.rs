@@ -1,13 +1,10 @@
 //! What resampled connections know in an iteration: candidates, how to draw from them, and what weights need.
 
-use super::caches::Caches;
-use super::combined::CombinedPmfs;
-use super::learnt::Learnt;
 use super::near::Near;
-use super::pmfs::{Choice, Pmfs};
-use super::sites::Sites;
+use super::places::{AtCaches, AtSites, Places};
+use super::pmfs::Choice;
 use super::store::LightStore;
-use super::{Scheme, Settings, Weights};
+use super::{Settings, Weights};
 use crate::integrators::bdpt::eye_path::Candidate;
 use crate::math::Vec3;
 use crate::math::hash::HashRng;
@@ -23,16 +20,8 @@ use crate::spatial::nearest::MOST;
 #[derive(Debug)]
 pub(in crate::integrators) struct Resampler {
     pub settings: Settings,
-    pub(super) caches: Option<Caches>,
+    pub(super) places: Places,
     pub(super) store: LightStore,
-    pub(super) pmfs: Pmfs,
-    /// Sites of importance caching, and probabilities there.
-    pub(super) sites: Option<Sites>,
-    pub(super) combined: CombinedPmfs,
-    /// What sites have found so far, if weights ask them.
-    pub(super) learnt: Learnt,
-    /// Where sub-paths of each length are drawn from by themselves: the share of sub-paths that are as long.
-    pub(super) lengths: Vec<f32>,
     /// Sum over sets of the number of vertices, and of sub-paths.
     pub(super) seen: [u64; 2],
     /// Seed and number of the iteration that is ready to be replayed.
@@ -47,26 +36,15 @@ pub(super) fn side(point: &SurfacePoint, d: Vec3) -> Vec3 {
 
 impl Resampler {
     pub fn new(settings: Settings) -> Resampler {
-        Resampler {
-            settings,
-            caches: None,
-            store: LightStore::default(),
-            pmfs: Pmfs::default(),
-            sites: None,
-            combined: CombinedPmfs::default(),
-            learnt: Learnt::default(),
-            lengths: vec![],
-            seen: [0; 2],
-            ready: None,
-        }
+        Resampler { settings, places: Places::None, store: LightStore::default(), seen: [0; 2], ready: None }
     }
 
     /// What is known of the light at a point, on the side of the direction `d`.
     #[inline]
     pub fn there(&self, point: &SurfacePoint, d: Vec3) -> There {
-        match &self.caches {
-            Some(caches) if self.settings.weights != Weights::Balance && !self.settings.form.asks() => {
-                caches.there(point.p, side(point, d))
+        match &self.places {
+            Places::Caches(at) if self.settings.weights != Weights::Balance && !self.settings.form.asks() => {
+                at.caches.there(point.p, side(point, d))
             }
             _ => There::default(),
         }
@@ -107,11 +85,9 @@ impl Resampler {
 
     /// What weights know of each length, where each is drawn from by itself.
     pub(super) fn by_length(&self) -> Option<Lengths> {
-        if self.sites.is_none() || !self.settings.form.asks() {
-            return None;
-        }
-        let numbers = (0..self.lengths.len()).map(|s| self.share_of_length(s) * self.settings.paths as f32);
-        Some(self.learnt.lengths(numbers.collect(), self.settings.epsilon))
+        let Places::Sites(at) = &self.places else { return None };
+        let numbers = at.lengths.iter().map(|share| share * self.settings.paths as f32);
+        self.settings.form.asks().then(|| at.learnt.lengths(numbers.collect(), self.settings.epsilon))
     }
 
     /// Draws candidates for an eye vertex at `point` that looks from the side of `wo`, and hands them to `connect`. Only a share `effort` of
@@ -128,36 +104,50 @@ impl Resampler {
         if self.store.is_empty() {
             return;
         }
-        if matches!(self.settings.scheme, Scheme::Caches) {
-            let near = self.near(point, wo);
-            for _ in 0..self.settings.samples {
-                let u = rng.next_4();
-                if u[2] < effort
-                    && let Some(candidate) = self.draw(&near, [u[0], u[1]], effort)
-                    && possible(candidate.vertex.length())
-                {
-                    connect(candidate);
+        match &self.places {
+            Places::None => {}
+            Places::Caches(at) => {
+                let near = self.near(point, wo);
+                for _ in 0..self.settings.samples {
+                    let u = rng.next_4();
+                    if u[2] < effort
+                        && let Some(candidate) = self.draw(at, &near, [u[0], u[1]], effort)
+                        && possible(candidate.vertex.length())
+                    {
+                        connect(candidate);
+                    }
                 }
             }
-            return;
+            Places::Sites(at) => self.draw_by_length(at, (point, wo), rng, effort, possible, connect),
         }
-        let (mut found, most) = ([0; MOST], self.settings.neighbours);
-        let Some(sites) = &self.sites else { return };
-        let count = sites.find(point.p, side(point, wo), most, &mut found);
-        for class in 0..self.combined.classes() {
-            let length = self.combined.length(class);
+    }
+
+    /// The same where sub-paths of each length are drawn from by themselves.
+    fn draw_by_length<'a>(
+        &'a self,
+        at: &AtSites,
+        (point, wo): (&SurfacePoint, Vec3),
+        rng: &mut HashRng,
+        effort: f32,
+        possible: impl Fn(usize) -> bool,
+        mut connect: impl FnMut(Candidate<'a>),
+    ) {
+        let mut found = [0; MOST];
+        let count = at.sites.find(point.p, side(point, wo), self.settings.neighbours, &mut found);
+        for class in 0..at.combined.classes() {
+            let length = at.combined.length(class);
             if length.is_some_and(|s| !possible(s)) {
                 continue;
             }
             // Long sub-paths are rare and dim: no more of them are connected to than a pixel's own sub-path would have. A sub-path is then
             // as likely to be met as by the pixel's own: in weights, such connections count as one.
-            let effort = effort * length.map_or(1.0, |s| self.share_of_length(s));
+            let effort = effort * length.map_or(1.0, |s| at.share_of_length(s));
             for _ in 0..self.settings.samples {
                 let u = rng.next_4();
                 if u[2] >= effort {
                     continue;
                 }
-                let drawn = self.combined.draw(class, &found[..count], [u[0], u[1]]);
+                let drawn = at.combined.draw(class, &found[..count], [u[0], u[1]]);
                 let number = self.settings.paths as f32 * self.settings.samples as f32;
                 let candidate = self.store.candidate(drawn.vertex, 1.0 / (drawn.probability * number * effort));
                 if possible(candidate.vertex.length()) {
@@ -167,24 +157,18 @@ impl Resampler {
         }
     }
 
-    /// Share of light sub-paths with at least s vertices, as far as is known; never zero.
-    pub(super) fn share_of_length(&self, s: usize) -> f32 {
-        let last = self.lengths.last().copied().unwrap_or(1.0);
-        self.lengths.get(s).copied().unwrap_or(last)
-    }
-
     /// Draws a candidate by the cache points `near`; `None` if there are none. Only a share `effort` of draws is made.
     #[inline]
-    fn draw(&self, near: &Near, u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
+    fn draw(&self, at: &AtCaches, near: &Near, u: [f32; 2], effort: f32) -> Option<Candidate<'_>> {
         let (proposal, Choice { entry, vertex, probability }) = match near.caches() {
             _ if self.settings.form == Form::Split => {
-                self.draw_split(near, u).map(|(proposal, choice)| (Some(proposal), choice))?
+                self.draw_split(&at.pmfs, near, u).map(|(proposal, choice)| (Some(proposal), choice))?
             }
             [] => (None, self.draw_anything(u[1])?),
-            caches => (None, self.pmfs.draw(caches, u)?),
+            caches => (None, at.pmfs.draw(caches, u)?),
         };
         let scale = 1.0 / (probability * self.settings.paths as f32 * self.settings.samples as f32 * effort);
-        let near = self.settings.form.asks().then(|| (*near, self.pmfs.seen(near.caches(), entry)));
+        let near = self.settings.form.asks().then(|| (*near, at.pmfs.seen(near.caches(), entry)));
         Some(Candidate { proposal, near, ..self.store.candidate(vertex, scale) })
     }
 
@@ -199,26 +183,15 @@ impl Resampler {
         Some(Choice { entry: vertex, vertex, probability: p as f32 })
     }
 
-    /// What there is to draw by, for people.
+    /// What there is to draw by and from, for people.
     pub fn note(&self) -> Option<String> {
-        match (&self.caches, &self.sites) {
-            (Some(caches), _) => {
-                let (points, groups, paths) = (caches.index.len(), caches.groups.len(), self.settings.paths);
-                Some(format!("{points} cache points in {groups} groups, {paths} light sub-paths"))
-            }
-            (_, sites) => sites.as_ref().map(Sites::note),
-        }
+        let note = self.places.note()?;
+        Some(format!("{note}, {} light sub-paths", self.settings.paths))
     }
 
     /// What must be saved to go on later, as bytes.
     pub fn state(&self) -> Vec<u8> {
-        let (sums, iterations) = match &self.caches {
-            Some(caches) => {
-                let (sums, iterations) = caches.state();
-                (sums.iter().flatten().copied().collect(), iterations)
-            }
-            None => (self.learnt.state(), 0),
-        };
+        let (sums, iterations) = self.places.state();
         if sums.is_empty() {
             return vec![];
         }
