@@ -25,12 +25,18 @@ fn bounds(points: &[Vec3]) -> [Vec3; 2] {
 
 /// Places of `points` on the curve through the box around them, each with the number of its point, in Morton order.
 pub fn sorted(points: &[Vec3]) -> Vec<(u32, u32)> {
+    let mut keys = vec![];
+    sort(points, &mut keys);
+    keys
+}
+
+/// The same in memory that is there already.
+pub fn sort(points: &[Vec3], keys: &mut Vec<(u32, u32)>) {
     let [lo, hi] = bounds(points);
     let key = |(i, p): (usize, &Vec3)| (code(*p, lo, hi), i as u32);
-    let mut keys: Vec<(u32, u32)> = points.par_iter().enumerate().map(key).collect();
+    points.par_iter().enumerate().map(key).collect_into_vec(keys);
     // All keys differ: the order is the same for any number of threads.
     keys.par_sort_unstable();
-    keys
 }
 
 /// Numbers of `points` in Morton order.

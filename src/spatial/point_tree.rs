@@ -31,6 +31,8 @@ pub struct PointTree {
     nodes: Vec<Node>,
     /// Sum of the weights of all points before each, and of all.
     sums: Vec<f64>,
+    /// Corners of the boxes around nodes, while these are built; kept for its memory.
+    boxes: Vec<(Vec3, Vec3)>,
 }
 
 /// Where a cut is looked at from: a ball of places whose surfaces face about the same way.
@@ -103,7 +105,9 @@ impl PointTree {
             }
             at += 1;
         }
-        let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); self.nodes.len()];
+        let boxes = &mut self.boxes;
+        boxes.clear();
+        boxes.resize(self.nodes.len(), (Vec3::INFINITY, Vec3::NEG_INFINITY));
         for i in (0..self.nodes.len()).rev() {
             let Node { first, end, child, .. } = self.nodes[i];
             let (lo, hi) = if child == 0 {

@@ -30,6 +30,20 @@ pub(in crate::integrators) struct LightStore {
     vertices: Vec<StoredVertex>,
     /// Tree over the vertices, weighed by the luminance of f_y/p.
     pub tree: PointTree,
+    order: Order,
+}
+
+/// What is written down to put vertices in order; kept for its memory.
+#[derive(Debug, Default)]
+struct Order {
+    positions: Vec<Vec3>,
+    /// Of each vertex its part, and its number there.
+    places: Vec<(u16, u32)>,
+    /// Morton codes with numbers of vertices, and codes alone.
+    keys: Vec<(u32, u32)>,
+    codes: Vec<u32>,
+    /// Positions in Morton order, with weights.
+    points: Vec<(Vec3, f32)>,
 }
 
 /// The light sub-paths of one piece of work.
@@ -130,27 +144,27 @@ impl LightStore {
     /// Puts the vertices of all `paths` sub-paths in order, and builds the tree over them if a first stage wants it.
     pub fn finish(&mut self, paths: u32, with_tree: bool) {
         self.paths_traced = paths;
-        let parts = &self.parts;
-        let of_part = |(number, part): (usize, &'_ Part)| {
-            let vertices = part.vertices.iter().enumerate();
-            vertices.map(move |(i, v)| (v.vertex.p, (number as u16, i as u32))).collect::<Vec<_>>()
-        };
-        let (positions, places): (Vec<Vec3>, Vec<(u16, u32)>) =
-            parts.par_iter().enumerate().flat_map_iter(of_part).unzip();
-        let order = morton::sorted(&positions);
+        let (parts, Order { positions, places, keys, codes, points }) = (&self.parts, &mut self.order);
+        positions.clear();
+        places.clear();
+        for (number, part) in parts.iter().enumerate() {
+            positions.extend(part.vertices.iter().map(|v| v.vertex.p));
+            places.extend((0..part.vertices.len()).map(|i| (number as u16, i as u32)));
+        }
+        morton::sort(positions, keys);
         let of_place = |&(_, i): &(u32, u32)| {
             let (part, i) = places[i as usize];
             StoredVertex { part, ..parts[usize::from(part)].vertices[i as usize] }
         };
-        order.par_iter().map(of_place).collect_into_vec(&mut self.vertices);
+        keys.par_iter().map(of_place).collect_into_vec(&mut self.vertices);
         if with_tree {
-            let codes: Vec<u32> = order.par_iter().map(|&(code, _)| code).collect();
+            keys.par_iter().map(|&(code, _)| code).collect_into_vec(codes);
             let weighed = |v: &StoredVertex| {
                 let weight = v.vertex.throughput.luminance();
                 (v.vertex.p, if weight.is_finite() { weight } else { 0.0 })
             };
-            let points: Vec<(Vec3, f32)> = self.vertices.par_iter().map(weighed).collect();
-            self.tree.build(&codes, &points);
+            self.vertices.par_iter().map(weighed).collect_into_vec(points);
+            self.tree.build(codes, points);
         }
     }
 
