@@ -63,3 +63,26 @@ fn parameters_do_not_change_the_expectation() {
         }
     }
 }
+
+/// What is learnt from iteration to iteration changes no expectation, and adds no noise that would not average out: the variance of the mean
+/// is a straight line in logarithms, and where it has become small the mean is still that of the path tracer.
+#[test]
+fn variance_falls_with_the_number_of_iterations_and_the_mean_stays() {
+    let scene = prepare(exhibit("room"), Backend::default_available(), None);
+    let reference = Picture::render(&path::SPEC, &scene, &[], 512, 700);
+    for spec in [&resampling::PCBPT, &resampling::RIS, &resampling::TWO_STAGE] {
+        let after = |iterations: u64| {
+            Picture::render(spec, &scene, &[("caches", "20000"), ("second_stage", "16")], iterations, 740 + iterations)
+        };
+        let counts = [5, 20, 80];
+        let pictures = counts.map(after);
+        let variances: Vec<f64> = pictures.iter().map(|p| p.variance.as_flattened().iter().sum()).collect();
+        // Variance times number of iterations, relative to the mean of that over all, in logarithms.
+        let levels: Vec<f64> = variances.iter().zip(counts).map(|(v, n)| (v * n as f64).ln()).collect();
+        let mean = levels.iter().sum::<f64>() / levels.len() as f64;
+        for (level, n) in levels.iter().zip(counts) {
+            assert!((level - mean).abs() < 0.35, "{}: {n} iterations, {levels:?}", spec.name);
+        }
+        pictures[2].assert_agrees(&reference, 0.0, &format!("{} after {} iterations", spec.name, counts[2]));
+    }
+}
