@@ -81,8 +81,7 @@ impl Bidirectional {
             false => 0,
         };
         let all = splat.max(kept);
-        let one_piece = |worker: &mut Worker, (chunk, part): (usize, Option<&mut Part>)| {
-            let mut part = part;
+        let one_piece = |worker: &mut Worker, (chunk, mut part): (usize, Option<&mut Part>)| {
             let mut tracer = Tracer::new(&*scene.query);
             let first = chunk as u32 * LIGHT_PATHS_AT_ONCE;
             for path in first..all.min(first + LIGHT_PATHS_AT_ONCE) {

@@ -102,7 +102,7 @@ impl Bidirectional {
             }
             _ => paths,
         };
-        (AtCaches { caches, pmfs: Pmfs::default() }, paths)
+        (AtCaches { caches, pmfs }, paths)
     }
 
     /// Sites of importance caching with what they find before the first iteration, if weights ask them.

@@ -14,7 +14,6 @@ use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 use crate::ray::offset::SegmentEnd;
 use crate::shade::{SurfacePoint, Transport};
-use crate::spatial::nearest::MOST;
 
 /// The candidates of an iteration and how to draw from them.
 #[derive(Debug)]
@@ -104,10 +103,10 @@ impl Resampler {
         if self.store.is_empty() {
             return;
         }
+        let near = self.near(point, wo);
         match &self.places {
             Places::None => {}
             Places::Caches(at) => {
-                let near = self.near(point, wo);
                 for _ in 0..self.settings.samples {
                     let u = rng.next_4();
                     if u[2] < effort
@@ -118,7 +117,7 @@ impl Resampler {
                     }
                 }
             }
-            Places::Sites(at) => self.draw_by_length(at, (point, wo), rng, effort, possible, connect),
+            Places::Sites(at) => self.draw_by_length(at, &near, rng, effort, possible, connect),
         }
     }
 
@@ -126,14 +125,12 @@ impl Resampler {
     fn draw_by_length<'a>(
         &'a self,
         at: &AtSites,
-        (point, wo): (&SurfacePoint, Vec3),
+        near: &Near,
         rng: &mut HashRng,
         effort: f32,
         possible: impl Fn(usize) -> bool,
         mut connect: impl FnMut(Candidate<'a>),
     ) {
-        let mut found = [0; MOST];
-        let count = at.sites.find(point.p, side(point, wo), self.settings.neighbours, &mut found);
         for class in 0..at.combined.classes() {
             let length = at.combined.length(class);
             if length.is_some_and(|s| !possible(s)) {
@@ -147,7 +144,7 @@ impl Resampler {
                 if u[2] >= effort {
                     continue;
                 }
-                let drawn = at.combined.draw(class, &found[..count], [u[0], u[1]]);
+                let drawn = at.combined.draw(class, near.caches(), [u[0], u[1]]);
                 let number = self.settings.paths as f32 * self.settings.samples as f32;
                 let candidate = self.store.candidate(drawn.vertex, 1.0 / (drawn.probability * number * effort));
                 if possible(candidate.vertex.length()) {

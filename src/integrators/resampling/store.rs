@@ -38,7 +38,7 @@ pub(in crate::integrators) struct LightStore {
 struct Order {
     positions: Vec<Vec3>,
     /// Of each vertex its part, and its number there.
-    places: Vec<(u16, u32)>,
+    sources: Vec<(u16, u32)>,
     /// Morton codes with numbers of vertices, and codes alone.
     keys: Vec<(u32, u32)>,
     codes: Vec<u32>,
@@ -144,19 +144,19 @@ impl LightStore {
     /// Puts the vertices of all `paths` sub-paths in order, and builds the tree over them if a first stage wants it.
     pub fn finish(&mut self, paths: u32, with_tree: bool) {
         self.paths_traced = paths;
-        let (parts, Order { positions, places, keys, codes, points }) = (&self.parts, &mut self.order);
+        let (parts, Order { positions, sources, keys, codes, points }) = (&self.parts, &mut self.order);
         positions.clear();
-        places.clear();
+        sources.clear();
         for (number, part) in parts.iter().enumerate() {
             positions.extend(part.vertices.iter().map(|v| v.vertex.p));
-            places.extend((0..part.vertices.len()).map(|i| (number as u16, i as u32)));
+            sources.extend((0..part.vertices.len()).map(|i| (number as u16, i as u32)));
         }
         morton::sort(positions, keys);
-        let of_place = |&(_, i): &(u32, u32)| {
-            let (part, i) = places[i as usize];
+        let of_source = |&(_, i): &(u32, u32)| {
+            let (part, i) = sources[i as usize];
             StoredVertex { part, ..parts[usize::from(part)].vertices[i as usize] }
         };
-        keys.par_iter().map(of_place).collect_into_vec(&mut self.vertices);
+        keys.par_iter().map(of_source).collect_into_vec(&mut self.vertices);
         if with_tree {
             keys.par_iter().map(|&(code, _)| code).collect_into_vec(codes);
             let weighed = |v: &StoredVertex| {
