@@ -1,116 +1,29 @@
-//! Choice of a light for a point: a binary tree over lights with a position, whose nodes bound the light's contribution.
+//! Choice of a light for a point: a tree of eight children a node over lights with a position, whose nodes bound the light's contribution.
 //!
-//! Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting" (bounds of §4.1, the surface area
-//! orientation heuristic of §4.4, importance of §5.1 without splitting), with the distance kept from falling below the node's radius.
-//! A walk from the root draws one light; the probability of any light is the product along its own path, which is kept as bits.
+//! Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting": importance of §5.1 without splitting,
+//! with the distance kept from falling below the node's radius, over the bounds of `light_bounds.rs`. The tree is cut in two as there,
+//! then three levels become one, so that the importances of eight children are computed side by side. A walk from the root draws
+//! one light; the probability of any light is the product along its own path, which is kept as bits.
 //!
-//! The walk ends early at a set of lights that face nearly one way and are seen under a small angle (`Node::is_one_from`): they are as
-//! good as one light, and one of them is chosen by its power. A finely tessellated emitter then costs a few levels, not all of them.
+//! The walk ends early at a set of lights that face nearly one way and are seen under a small angle (`Children::is_one_from`): they
+//! are as good as one light, and one of them is chosen by its power. A finely tessellated emitter then costs a few levels, not all of
+//! them.
 
 use super::light::Light;
+use super::light_bounds::{Bounds, split};
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Pmf, Vec3};
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::ops::Range;
 
-/// A cone of directions: axis and half angle `spread` of the normals, and how far beyond them a normal emits.
-#[derive(Clone, Copy, Debug)]
-struct Cone {
-    axis: Vec3,
-    spread: f32,
-    emission: f32,
-}
+/// Children of a node.
+const WIDTH: usize = 8;
+/// Levels of the binary tree that one node stands for.
+const LEVELS: u32 = WIDTH.ilog2();
+/// Below this depth of the binary tree sets are halved by count, so that the turns to any of 2³² lights fit into 64 bits.
+const MAX_CHOSEN_DEPTH: u32 = 31;
 
-impl Cone {
-    fn union(self, other: Cone) -> Cone {
-        let (a, b) = if self.spread >= other.spread { (self, other) } else { (other, self) };
-        let emission = a.emission.max(b.emission);
-        let between = a.axis.dot(b.axis).clamp(-1.0, 1.0).acos();
-        if (between + b.spread).min(PI) <= a.spread {
-            return Cone { emission, ..a };
-        }
-        let spread = 0.5 * (a.spread + between + b.spread);
-        let pivot = a.axis.cross(b.axis);
-        if spread >= PI || pivot.length_squared() < 1e-12 {
-            return Cone { axis: a.axis, spread: PI, emission };
-        }
-        let axis = glam::Quat::from_axis_angle(pivot.normalize(), spread - a.spread) * a.axis;
-        Cone { axis: axis.normalize(), spread, emission }
-    }
-
-    /// M_Ω, the orientation measure: the solid angle lit, weighted by the cosine beyond the spread.
-    fn measure(&self) -> f32 {
-        let w = (self.spread + self.emission).min(PI);
-        let (sin, cos) = self.spread.sin_cos();
-        2.0 * PI * (1.0 - cos)
-            + FRAC_PI_2 * (2.0 * w * sin - (self.spread - 2.0 * w).cos() - 2.0 * self.spread * sin + cos)
-    }
-}
-
-/// What is known of the lights below a node.
-#[derive(Clone, Copy, Debug)]
-struct Bounds {
-    min: Vec3,
-    max: Vec3,
-    cone: Cone,
-    power: f32,
-}
-
-impl Bounds {
-    fn of(light: &Light) -> Option<Bounds> {
-        let power = light.power();
-        if !(power > 0.0 && power.is_finite()) {
-            return None;
-        }
-        let (min, max, cone) = match light {
-            Light::Triangle(l) => {
-                let [a, b, c] = l.corners();
-                (a.min(b).min(c), a.max(b).max(c), Cone { axis: l.ng(), spread: 0.0, emission: FRAC_PI_2 })
-            }
-            Light::Point(l) => (l.position(), l.position(), Cone { axis: Vec3::Z, spread: PI, emission: FRAC_PI_2 }),
-            // Nearly uniform inside: the whole cone counts as normals, and nothing lies beyond.
-            Light::Spot(l) => (l.position(), l.position(), Cone { axis: l.axis(), spread: l.cutoff(), emission: 1e-3 }),
-            Light::Directional(_) | Light::Environment(_) => return None,
-        };
-        Some(Bounds { min, max, cone, power })
-    }
-
-    fn union(self, o: Bounds) -> Bounds {
-        Bounds {
-            min: self.min.min(o.min),
-            max: self.max.max(o.max),
-            cone: self.cone.union(o.cone),
-            power: self.power + o.power,
-        }
-    }
-
-    fn centre(&self) -> Vec3 {
-        self.min + (self.max - self.min) * 0.5
-    }
-
-    /// Surface area, with a thickness so that flat and point-like sets still tell far from near.
-    fn area(&self, thickness: f32) -> f32 {
-        let d = self.max - self.min + Vec3::splat(thickness);
-        2.0 * (d.x * d.y + d.y * d.z + d.z * d.x)
-    }
-}
-
-/// A node as it is walked: bounding sphere, cone as cosines and sines, power.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    centre: Vec3,
-    radius2: f32,
-    axis: Vec3,
-    cos_spread: f32,
-    sin_spread: f32,
-    cos_emission: f32,
-    power: f32,
-    /// Squared distance of `centre` from which on the node counts as one light; infinite if it is too wide open, or a leaf.
-    one_from2: f32,
-    link: Link,
-    /// Its lights are places `begin..end` of the tree's order.
-    begin: u32,
-    end: u32,
-}
+/// One number of each child.
+type Lanes = [f32; WIDTH];
 
 /// A set of lights whose normals differ by no more than this from their axis, in radians …
 const ONE_SPREAD: f32 = 0.2;
@@ -118,84 +31,161 @@ const ONE_SPREAD: f32 = 0.2;
 /// which is little beside what visibility and the BSDF leave.
 const ONE_RADIUS: f32 = 0.1;
 
-#[derive(Clone, Copy, Debug)]
-enum Link {
-    /// The light's index.
-    Leaf(u32),
-    /// The first child follows its parent; this is the second's index.
-    Inner(u32),
+/// The children of a node, number by number. A child is a set of lights: its bounding sphere, its cone as cosines and sines, its
+/// power, its range of the tree's order. Lanes without a child have no power.
+#[derive(Clone, Debug, Default)]
+#[repr(C, align(64))]
+struct Children {
+    centre: [Lanes; 3],
+    radius2: Lanes,
+    axis: [Lanes; 3],
+    cos_spread: Lanes,
+    sin_spread: Lanes,
+    cos_emission: Lanes,
+    power: Lanes,
+    /// Squared distance of `centre` from which on the child counts as one light; infinite if it is too wide open, less than nothing if
+    /// it is one light.
+    one_from2: Lanes,
+    begin: [u32; WIDTH],
+    end: [u32; WIDTH],
+    /// The child's own children, if it is more than one light.
+    below: [u32; WIDTH],
 }
 
 /// Cosine and sine of max(0, a − b) for angles in [0, π].
+#[inline]
 fn subtract(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
-    if a.0 >= b.0 { (1.0, 0.0) } else { (a.0 * b.0 + a.1 * b.1, (a.1 * b.0 - a.0 * b.1).max(0.0)) }
+    let (cos, sin) = (a.0 * b.0 + a.1 * b.1, (a.1 * b.0 - a.0 * b.1).max(0.0));
+    if a.0 >= b.0 { (1.0, 0.0) } else { (cos, sin) }
 }
 
+#[inline]
 fn with_sine(cos: f32) -> (f32, f32) {
-    (cos, (1.0 - cos * cos).max(0.0).sqrt())
+    let cos = cos.clamp(-1.0, 1.0);
+    (cos, (1.0 - cos * cos).sqrt())
 }
 
-impl Node {
-    fn new(b: &Bounds, link: Link, range: std::ops::Range<usize>) -> Node {
-        let (sin_spread, cos_spread) = b.cone.spread.sin_cos();
-        let radius2 = 0.25 * (b.max - b.min).length_squared();
-        let one = matches!(link, Link::Inner(_)) && b.cone.spread <= ONE_SPREAD;
-        Node {
-            centre: b.centre(),
-            radius2,
-            axis: b.cone.axis,
-            cos_spread,
-            sin_spread,
-            cos_emission: b.cone.emission.cos(),
-            power: b.power,
-            one_from2: if one { radius2 / (ONE_RADIUS * ONE_RADIUS) } else { f32::INFINITY },
-            link,
-            begin: range.start as u32,
-            end: range.end as u32,
+impl Children {
+    fn set(&mut self, lane: usize, set: &Set) {
+        let b = &set.bounds;
+        let (centre, axis) = (b.centre().to_array(), b.cone.axis.to_array());
+        for c in 0..3 {
+            self.centre[c][lane] = centre[c];
+            self.axis[c][lane] = axis[c];
         }
-    }
-
-    /// Whether the lights below need not be told apart at the point `p`.
-    #[inline]
-    fn is_one_from(&self, p: Vec3) -> bool {
-        self.centre.distance_squared(p) > self.one_from2
-    }
-
-    /// An estimate of the light that arrives; zero only if none can.
-    #[inline]
-    fn importance(&self, p: Vec3, n: Option<Vec3>) -> f32 {
-        let to = self.centre - p;
-        let d2 = to.length_squared();
-        if d2 <= self.radius2 || d2 < f32::MIN_POSITIVE {
-            return self.power / d2.max(self.radius2).max(f32::MIN_POSITIVE);
-        }
-        let inverse_d2 = 1.0 / d2;
-        let wi = to * inverse_d2.sqrt();
-        // Half angle under which the bounding sphere is seen.
-        let seen = {
-            let sin2 = self.radius2 * inverse_d2;
-            ((1.0 - sin2).max(0.0).sqrt(), sin2.sqrt())
+        self.radius2[lane] = b.radius2();
+        (self.sin_spread[lane], self.cos_spread[lane]) = b.cone.spread.sin_cos();
+        self.cos_emission[lane] = b.cone.emission.cos();
+        self.power[lane] = b.power;
+        self.one_from2[lane] = match set.halves {
+            None => -1.0,
+            Some(_) if b.cone.spread <= ONE_SPREAD => self.radius2[lane] / (ONE_RADIUS * ONE_RADIUS),
+            Some(_) => f32::INFINITY,
         };
-        let facing = with_sine((-self.axis.dot(wi)).clamp(-1.0, 1.0));
-        let beyond = subtract(subtract(facing, (self.cos_spread, self.sin_spread)), seen);
-        // Rounding must not darken a light that just reaches the point.
-        if beyond.0 < self.cos_emission - 1e-4 {
-            return 0.0;
+        (self.begin[lane], self.end[lane]) = (set.range.start, set.range.end);
+    }
+
+    fn range(&self, lane: usize) -> Range<usize> {
+        self.begin[lane] as usize..self.end[lane] as usize
+    }
+
+    /// Whether the lights of a child need not be told apart at the point `p`.
+    #[inline]
+    fn is_one_from(&self, lane: usize, p: Vec3) -> bool {
+        let centre = Vec3::new(self.centre[0][lane], self.centre[1][lane], self.centre[2][lane]);
+        let near = centre.distance_squared(p) <= self.one_from2[lane];
+        !near
+    }
+
+    /// Estimates of the light that arrives from each child; zero only if none can. No branches: all lanes are computed at once.
+    #[inline]
+    fn importance<const FACING: bool>(&self, p: Vec3, n: Vec3) -> Lanes {
+        std::array::from_fn(|k| {
+            let to: [f32; 3] = [self.centre[0][k] - p.x, self.centre[1][k] - p.y, self.centre[2][k] - p.z];
+            let d2 = to[0] * to[0] + to[1] * to[1] + to[2] * to[2];
+            let inside = d2 <= self.radius2[k] || d2 < f32::MIN_POSITIVE;
+            let inverse_d2 = 1.0 / d2.max(self.radius2[k]).max(f32::MIN_POSITIVE);
+            let inverse_d = inverse_d2.sqrt();
+            let cos_to = |v: [f32; 3]| (v[0] * to[0] + v[1] * to[1] + v[2] * to[2]) * inverse_d;
+            // Half angle under which the bounding sphere is seen.
+            let sin2 = (self.radius2[k] * inverse_d2).min(1.0);
+            let seen = ((1.0 - sin2).sqrt(), sin2.sqrt());
+            let facing = with_sine(-cos_to([self.axis[0][k], self.axis[1][k], self.axis[2][k]]));
+            let beyond = subtract(subtract(facing, (self.cos_spread[k], self.sin_spread[k])), seen).0;
+            // Rounding must not darken a light that just reaches the point.
+            let mut factor = if beyond < self.cos_emission[k] - 1e-4 { 0.0 } else { beyond.max(1e-3) };
+            if FACING {
+                let cos = subtract(with_sine(cos_to([n.x, n.y, n.z])), seen).0;
+                factor *= if cos < -1e-4 { 0.0 } else { cos.max(1e-3) };
+            }
+            self.power[k] * inverse_d2 * if inside { 1.0 } else { factor }
+        })
+    }
+
+    /// The sums of the importances before each child, and of all.
+    #[inline]
+    fn shares(&self, p: Vec3, n: Option<Vec3>) -> Shares {
+        let importance = match n {
+            Some(n) => self.importance::<true>(p, n),
+            None => self.importance::<false>(p, Vec3::ZERO),
+        };
+        let shares = Shares::new(&importance);
+        // Where nothing arrives the choice does not matter, but probabilities still sum to one.
+        if shares.total() > 0.0 && shares.total().is_finite() { shares } else { Shares::new(&self.power) }
+    }
+}
+
+/// The unit interval divided among the children of a node, not normalised. In double precision, in which sums of eight numbers are as
+/// good as exact: no child loses its part to rounding, and what is left of a random number can be used again at every level.
+struct Shares([f64; WIDTH + 1]);
+
+impl Shares {
+    #[inline]
+    fn new(parts: &Lanes) -> Shares {
+        let [a, b, c, d, e, f, g, h] = parts.map(f64::from);
+        // In an order that keeps the chain of additions short.
+        let (half, pair) = ((a + b) + (c + d), e + f);
+        Shares([0.0, a, a + b, (a + b) + c, half, half + e, half + pair, half + (pair + g), half + (pair + (g + h))])
+    }
+
+    #[inline]
+    fn total(&self) -> f64 {
+        self.0[WIDTH]
+    }
+
+    /// Width of the part of `child`.
+    #[inline]
+    fn part(&self, child: usize) -> f64 {
+        self.0[child + 1] - self.0[child]
+    }
+
+    /// Probability of `child`.
+    #[inline]
+    fn pmf(&self, child: usize) -> f32 {
+        (self.part(child) / self.total()) as f32
+    }
+
+    /// The child that `u` in [0, 1) chooses, and what is left of the number.
+    #[inline]
+    fn choose(&self, u: f64) -> (usize, f64) {
+        let target = u * self.total();
+        let mut child = (1..WIDTH).map(|k| usize::from(target >= self.0[k])).sum::<usize>();
+        // Rounding put the number at the very end, behind the last part.
+        while child > 0 && self.part(child) <= 0.0 {
+            child -= 1;
         }
-        let importance = self.power * inverse_d2 * beyond.0.max(1e-3);
-        let Some(n) = n else { return importance };
-        let (cos, _) = subtract(with_sine(n.dot(wi).clamp(-1.0, 1.0)), seen);
-        if cos < -1e-4 { 0.0 } else { importance * cos.max(1e-3) }
+        (child, ((target - self.0[child]) / self.part(child)).clamp(0.0, 1.0 - f64::EPSILON))
     }
 }
 
 /// The tree.
 #[derive(Debug, Default)]
 pub struct LightTree {
-    nodes: Vec<Node>,
+    /// The root is the only child of the first, and every other node follows the one above it.
+    nodes: Vec<Children>,
     /// By light: where it is; `None` for lights that are not in the tree.
     places: Vec<Option<Place>>,
-    /// The lights from the first leaf to the last.
+    /// The lights in the order of the leaves.
     order: Vec<u32>,
     /// Sum of the powers before each place of `order`, and of all.
     sums: Vec<f64>,
@@ -203,16 +193,46 @@ pub struct LightTree {
 
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// Turns from the root: bit 0 first, 1 = second child.
+    /// The child to take at each node from the root on, three bits each, the lowest first.
     path: u64,
     /// In `order`.
     index: u32,
 }
 
-/// Below this depth subtrees are halved by count, so that 64 turns suffice for 2³² lights.
-const MAX_CHOSEN_DEPTH: u32 = 32;
-/// Buckets per axis in which splits are tried.
-const BUCKETS: usize = 12;
+/// A set of lights of the binary tree.
+struct Set {
+    bounds: Bounds,
+    /// Its lights are places of the tree's order.
+    range: Range<u32>,
+    /// `None` for a single light.
+    halves: Option<[Box<Set>; 2]>,
+}
+
+impl Set {
+    fn is_single(&self) -> bool {
+        self.halves.is_none()
+    }
+
+    /// Its children in a tree with nodes of [`WIDTH`] children: the sets [`LEVELS`] below it, and if they are fewer, the parts of those
+    /// that can least be treated as one.
+    fn children(&self) -> Vec<&Set> {
+        let mut children = vec![self];
+        for _ in 0..LEVELS {
+            let halves = |set| match set {
+                &Set { halves: Some([ref a, ref b]), .. } => vec![&**a, &**b],
+                single => vec![single],
+            };
+            children = children.into_iter().flat_map(halves).collect();
+        }
+        while children.len() < WIDTH {
+            let open = (0..children.len()).filter(|&i| !children[i].is_single());
+            let costliest = open.max_by(|&i, &j| children[i].bounds.cost().total_cmp(&children[j].bounds.cost()));
+            let Some((i, Some([a, b]))) = costliest.map(|i| (i, &children[i].halves)) else { break };
+            children.splice(i..=i, [&**a, &**b]);
+        }
+        children
+    }
+}
 
 impl LightTree {
     /// Over the lights that have a position and power.
@@ -222,8 +242,11 @@ impl LightTree {
         let mut tree =
             LightTree { nodes: Vec::new(), places: vec![None; lights.len()], order: Vec::new(), sums: vec![0.0] };
         if !items.is_empty() {
-            tree.nodes.reserve(2 * items.len());
-            tree.build(&mut items, 0, 0);
+            let root = tree.halve(&mut items, 0);
+            let mut above = Children::default();
+            above.set(0, &root);
+            tree.nodes.push(above);
+            tree.widen((0, 0), &root, (0, 0));
         }
         tree
     }
@@ -233,39 +256,46 @@ impl LightTree {
         self.nodes.is_empty()
     }
 
-    fn build(&mut self, items: &mut [(u32, Bounds)], path: u64, depth: u32) -> Bounds {
-        let index = self.nodes.len();
+    /// The binary tree; puts the lights in order.
+    fn halve(&mut self, items: &mut [(u32, Bounds)], depth: u32) -> Set {
+        let begin = self.order.len() as u32;
         if let [(light, bounds)] = items {
-            let place = self.order.len();
-            self.nodes.push(Node::new(bounds, Link::Leaf(*light), place..place + 1));
-            self.places[*light as usize] = Some(Place { path, index: place as u32 });
             self.order.push(*light);
-            self.sums.push(self.sums[place] + f64::from(bounds.power));
-            return *bounds;
+            self.sums.push(self.sums[begin as usize] + f64::from(bounds.power));
+            return Set { bounds: *bounds, range: begin..begin + 1, halves: None };
         }
-        let middle = split(items, depth);
+        let middle = split(items, depth >= MAX_CHOSEN_DEPTH);
         let (first, second) = items.split_at_mut(middle);
-        // Filled in when the children are known.
-        let begin = self.order.len();
-        let placeholder = Node::new(&first[0].1, Link::Leaf(0), 0..0);
-        self.nodes.push(placeholder);
-        let a = self.build(first, path, depth + 1);
-        let link = Link::Inner(self.nodes.len() as u32);
-        let b = self.build(second, path | 1 << depth, depth + 1);
-        let bounds = a.union(b);
-        self.nodes[index] = Node::new(&bounds, link, begin..self.order.len());
-        bounds
+        let halves = [first, second].map(|half| Box::new(self.halve(half, depth + 1)));
+        let bounds = halves[0].bounds.union(halves[1].bounds);
+        Set { bounds, range: begin..self.order.len() as u32, halves: Some(halves) }
     }
 
-    /// Probability of the light at `place` of the order among those of `node`, by power.
-    fn share_by_power(&self, node: &Node, place: usize) -> f32 {
-        let total = self.sums[node.end as usize] - self.sums[node.begin as usize];
+    /// Makes the nodes below the child `at` = (node, lane), which is `set` and reached by the turns `path`, `shift` bits of them.
+    fn widen(&mut self, at: (usize, usize), set: &Set, (path, shift): (u64, u32)) {
+        if set.is_single() {
+            let index = set.range.start;
+            self.places[self.order[index as usize] as usize] = Some(Place { path, index });
+            return;
+        }
+        let node = self.nodes.len();
+        self.nodes[at.0].below[at.1] = node as u32;
+        self.nodes.push(Children::default());
+        for (lane, child) in set.children().into_iter().enumerate() {
+            self.nodes[node].set(lane, child);
+            self.widen((node, lane), child, (path | (lane as u64) << shift, shift + LEVELS));
+        }
+    }
+
+    /// Probability of the light at `place` of the order among those at `range`, by power.
+    fn share_by_power(&self, range: &Range<usize>, place: usize) -> f32 {
+        let total = self.sums[range.end] - self.sums[range.start];
         ((self.sums[place + 1] - self.sums[place]) / total) as f32
     }
 
-    /// Place of the light of `node` that `u` in [0, 1) chooses by power.
-    fn place_by_power(&self, node: &Node, u: f64) -> usize {
-        let (begin, end) = (node.begin as usize, node.end as usize);
+    /// Place of the light of those at `range` that `u` in [0, 1) chooses by power.
+    fn place_by_power(&self, range: &Range<usize>, u: f64) -> usize {
+        let (begin, end) = (range.start, range.end);
         let target = self.sums[begin] + u * (self.sums[end] - self.sums[begin]);
         // Triangles of one emitter are often alike, so that the search begins next to its end.
         let guess = (begin + (u * (end - begin) as f64) as usize).min(end - 1);
@@ -293,45 +323,22 @@ impl LightTree {
         low
     }
 
-    /// Probability of the second child.
-    fn second_share(&self, first: usize, second: usize, p: Vec3, n: Option<Vec3>) -> f32 {
-        let (a, b) = (&self.nodes[first], &self.nodes[second]);
-        let (ia, ib) = (a.importance(p, n), b.importance(p, n));
-        let total = ia + ib;
-        // Where nothing arrives the choice does not matter, but probabilities still sum to one.
-        if total > 0.0 && total.is_finite() { ib / total } else { b.power / (a.power + b.power) }
-    }
-
     /// Draws a light for the point `p`; see [`super::LightSet::pick_from`]. `None` for an empty tree.
     pub fn sample(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(u32, Pmf)> {
-        let mut at = 0;
-        let mut pmf = 1.0;
+        let (mut node, mut lane, mut pmf) = (self.nodes.first()?, 0, 1.0);
         let mut u = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON));
-        loop {
-            let node = self.nodes.get(at)?;
-            match node.link {
-                Link::Leaf(light) => return Some((light, Pmf(pmf))),
-                Link::Inner(_) if node.is_one_from(p) => {
-                    let place = self.place_by_power(node, u);
-                    return Some((self.order[place], Pmf(pmf * self.share_by_power(node, place))));
-                }
-                Link::Inner(second) => {
-                    let share = self.second_share(at + 1, second as usize, p, n);
-                    let first_share = 1.0 - share;
-                    let split = f64::from(first_share);
-                    // In double precision the number can be used again at every level.
-                    if u < split {
-                        u /= split;
-                        pmf *= first_share;
-                        at += 1;
-                    } else {
-                        u = ((u - split) / f64::from(share)).min(1.0 - f64::EPSILON);
-                        pmf *= share;
-                        at = second as usize;
-                    }
-                }
-            }
+        while !node.is_one_from(lane, p) {
+            node = &self.nodes[node.below[lane] as usize];
+            let shares = node.shares(p, n);
+            (lane, u) = shares.choose(u);
+            pmf *= shares.pmf(lane);
         }
+        let range = node.range(lane);
+        if range.len() == 1 {
+            return Some((self.order[range.start], Pmf(pmf)));
+        }
+        let place = self.place_by_power(&range, u);
+        Some((self.order[place], Pmf(pmf * self.share_by_power(&range, place))))
     }
 
     /// Probability with which [`LightTree::sample`] draws `light`.
@@ -339,90 +346,14 @@ impl LightTree {
         let Some(Some(Place { mut path, index })) = self.places.get(light as usize).copied() else {
             return Pmf(0.0);
         };
-        let (mut at, mut pmf) = (0, 1.0);
-        while let Link::Inner(second) = self.nodes[at].link {
-            let node = &self.nodes[at];
-            if node.is_one_from(p) {
-                return Pmf(pmf * self.share_by_power(node, index as usize));
-            }
-            let share = self.second_share(at + 1, second as usize, p, n);
-            if path & 1 == 0 {
-                pmf *= 1.0 - share;
-                at += 1;
-            } else {
-                pmf *= share;
-                at = second as usize;
-            }
-            path >>= 1;
+        let (mut node, mut lane, mut pmf) = (&self.nodes[0], 0, 1.0);
+        while !node.is_one_from(lane, p) {
+            node = &self.nodes[node.below[lane] as usize];
+            lane = path as usize % WIDTH;
+            path >>= LEVELS;
+            pmf *= node.shares(p, n).pmf(lane);
         }
-        Pmf(pmf)
-    }
-}
-
-/// Orders `items` and says where to cut them (both parts non-empty): the cheapest bucket boundary of the surface area orientation
-/// heuristic, or the middle if there is none.
-fn split(items: &mut [(u32, Bounds)], depth: u32) -> usize {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    let (mut all_low, mut all_high) = (low, high);
-    for (_, b) in items.iter() {
-        low = low.min(b.centre());
-        high = high.max(b.centre());
-        all_low = all_low.min(b.min);
-        all_high = all_high.max(b.max);
-    }
-    let extent = high - low;
-    let whole = all_high - all_low;
-    let thickness = 1e-3 * whole.max_element();
-    let bucket_of = |b: &Bounds, axis: usize| {
-        (((b.centre()[axis] - low[axis]) / extent[axis] * BUCKETS as f32) as usize).min(BUCKETS - 1)
-    };
-    let mut best: Option<(f32, usize, usize)> = None;
-    for axis in (0..3).filter(|&axis| depth < MAX_CHOSEN_DEPTH && extent[axis] > 0.0) {
-        let mut buckets: [Option<Bounds>; BUCKETS] = [None; BUCKETS];
-        for (_, b) in items.iter() {
-            let bucket = &mut buckets[bucket_of(b, axis)];
-            *bucket = Some(bucket.map_or(*b, |o| o.union(*b)));
-        }
-        let join = |a: Option<Bounds>, b: &Option<Bounds>| match (a, b) {
-            (Some(a), Some(b)) => Some(a.union(*b)),
-            (a, b) => a.or(*b),
-        };
-        let cost = |b: Option<Bounds>| b.map(|b| b.power * b.area(thickness) * b.cone.measure());
-        let above: Vec<Option<f32>> = {
-            let mut sum = None;
-            let mut v: Vec<_> = buckets
-                .iter()
-                .rev()
-                .map(|b| {
-                    sum = join(sum, b);
-                    cost(sum)
-                })
-                .collect();
-            v.reverse();
-            v
-        };
-        // Long thin sets should be cut across their length.
-        let shape = whole.max_element() / whole[axis].max(thickness);
-        let mut below = None;
-        for k in 1..BUCKETS {
-            below = join(below, &buckets[k - 1]);
-            if let (Some(a), Some(b)) = (cost(below), above[k]) {
-                let c = shape * (a + b);
-                if c.is_finite() && best.is_none_or(|(lowest, ..)| c < lowest) {
-                    best = Some((c, axis, k));
-                }
-            }
-        }
-    }
-    match best {
-        Some((_, axis, cut)) => {
-            items.sort_unstable_by_key(|(i, b)| (bucket_of(b, axis) >= cut, *i));
-            items.partition_point(|(_, b)| bucket_of(b, axis) < cut)
-        }
-        None => {
-            let axis = extent.max_position();
-            items.sort_unstable_by(|a, b| a.1.centre()[axis].total_cmp(&b.1.centre()[axis]).then(a.0.cmp(&b.0)));
-            items.len() / 2
-        }
+        let range = node.range(lane);
+        Pmf(if range.len() == 1 { pmf } else { pmf * self.share_by_power(&range, index as usize) })
     }
 }
