@@ -5,9 +5,14 @@
 //! of technique: D′/D = Σ_kinds (n′/n) w_kind. So the samples of one setting tell the variance of any other, and with the costs of the kinds
 //! the best of them (Grittmann et al. 2022, "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms").
 //!
+//! That is the whole change if samples come and go one by one. Connections to one light sub-path stay or go together, and bring much or
+//! nothing together: with fewer of them, the products of the contributions of a pixel's sample count as well
+//! ([`EffortStatistics::add_together`]).
+//!
 //! Sums go by regions of the picture, so that each counts relative to its own brightness.
 
 use super::weigh::Weight;
+use crate::math::Rgb;
 
 /// Numbers of samples relative to the full ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,9 +38,51 @@ impl Effort {
     /// Everything.
     pub const FULL: Effort = Effort { light_image: 1.0, connections: 1.0 };
 
+    /// D′/D of a path with these weights at full effort.
+    fn remains(&self, weight: &Weight) -> f64 {
+        let less = f64::from(weight.light_image) * f64::from(1.0 - self.light_image)
+            + f64::from(weight.connections) * f64::from(1.0 - self.connections);
+        // Weights sum to one up to rounding.
+        (1.0 - less).max(1e-6)
+    }
+
     fn cost(&self, costs: &Costs) -> f64 {
         costs.base + costs.light_image * f64::from(self.light_image) + costs.connections * f64::from(self.connections)
     }
+}
+
+/// One of the contributions to a pixel's sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Together {
+    /// What it brought, weighted.
+    pub value: Rgb,
+    /// Its weights.
+    pub weight: Weight,
+    /// It is a connection.
+    pub connection: bool,
+}
+
+impl Together {
+    fn is_finite(&self) -> bool {
+        self.value.is_finite() && self.weight.light_image.is_finite() && self.weight.connections.is_finite()
+    }
+}
+
+/// Sums over pairs of unlike contributions of their products, mean of the channels, if each is multiplied by what `scale` makes of its
+/// weights: with connections, and without.
+fn pairs(contributions: &[Together], scale: impl Fn(&Weight) -> f64) -> (f64, f64) {
+    let mut pairs = (0.0, 0.0);
+    for channel in 0..3 {
+        let (mut sums, mut squares) = ([0.0; 2], [0.0; 2]);
+        for c in contributions {
+            let value = f64::from(c.value.to_array()[channel]) * scale(&c.weight);
+            sums[usize::from(c.connection)] += value;
+            squares[usize::from(c.connection)] += value * value;
+        }
+        pairs.0 += ((sums[0] + sums[1]).powi(2) - squares[0] - squares[1]) / 3.0;
+        pairs.1 += (sums[0].powi(2) - squares[0]) / 3.0;
+    }
+    pairs
 }
 
 /// Statistics of one region of the picture: for every candidate setting, by how much it would raise the second moment.
@@ -70,11 +117,23 @@ impl EffortStatistics {
             return;
         }
         for (rise, effort) in region.rises.iter_mut().zip(&self.candidates) {
-            let less = f64::from(weight.light_image) * f64::from(1.0 - effort.light_image)
-                + f64::from(weight.connections) * f64::from(1.0 - effort.connections);
-            // Weights sum to one up to rounding.
-            let remains = (1.0 - less).max(1e-6);
-            *rise += square * (1.0 / remains - 1.0);
+            *rise += square * (1.0 / effort.remains(weight) - 1.0);
+        }
+    }
+
+    /// Takes in that one sample of a pixel was made of `contributions`, each of which has been added before, and whose connections
+    /// were to one light sub-path. Counts for `times` such samples.
+    pub fn add_together(&mut self, region: usize, contributions: &[Together], times: f64) {
+        let Some(region) = self.regions.get_mut(region) else { return };
+        if !contributions.iter().all(Together::is_finite) {
+            return;
+        }
+        let now = pairs(contributions, |_| 1.0);
+        for (rise, effort) in region.rises.iter_mut().zip(&self.candidates) {
+            // A contribution is f/D, whatever D is.
+            let (all, alone) = pairs(contributions, |weight| 1.0 / effort.remains(weight));
+            let present = f64::from(effort.connections);
+            *rise += times * (present * all + (1.0 - present) * alone - now.0);
         }
     }
 
@@ -169,6 +228,40 @@ mod tests {
             let predicted = statistics.regions[0].rises[number] / (N / 3) as f64;
             let rise = moment(effort) - moment(Effort::FULL);
             assert!((predicted - rise).abs() < 0.02 * rise.abs() + 1e-9, "{effort:?}: {predicted} {rise}");
+        }
+    }
+
+    /// The second moment of a pixel's sample that is made of two contributions of an eye sub-path and, with probability q, of two
+    /// connections to one light sub-path, by brute force against what full effort predicts.
+    #[test]
+    fn contributions_that_come_together_are_predicted() {
+        let f = |k: usize, x: usize| 1.0 + k as f64 + (x as f64 * 0.7).sin();
+        let (eye, light) = (1.0 / 20.0, |x: usize| (x as f64 + 0.5) / 200.0);
+        let all = || (0..20).flat_map(|x| (0..20).map(move |y| (x, y, eye * light(y))));
+        let moment = |q: f64| -> f64 {
+            let brings = |x: usize| (f(0, x) + f(1, x)) / (eye + q * light(x));
+            all().map(|(x, y, p)| p * (q * (brings(x) + brings(y)).powi(2) + (1.0 - q) * brings(x).powi(2))).sum()
+        };
+        let mut statistics = EffortStatistics::new(candidates(), 1);
+        for (x, y, p) in all() {
+            let contribution = |k: usize, at: usize, connection: bool| {
+                let d = eye + light(at);
+                let share = light(at) / d;
+                let own = if connection { share } else { 1.0 - share } as f32;
+                let weight = Weight { own, light_image: 0.0, connections: share as f32 };
+                Together { value: Rgb::grey((f(k, at) / d) as f32), weight, connection }
+            };
+            let sample =
+                [(0, x, false), (1, x, false), (0, y, true), (1, y, true)].map(|(k, at, c)| contribution(k, at, c));
+            for c in &sample {
+                statistics.add(0, p * f64::from(c.value.g).powi(2), &c.weight);
+            }
+            statistics.add_together(0, &sample, p);
+        }
+        for (number, effort) in candidates().into_iter().enumerate() {
+            let rise = moment(f64::from(effort.connections)) - moment(1.0);
+            let predicted = statistics.regions[0].rises[number];
+            assert!((predicted - rise).abs() < 1e-4 * (1.0 + rise.abs()), "{effort:?}: {predicted} {rise}");
         }
     }
 

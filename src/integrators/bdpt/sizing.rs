@@ -9,7 +9,7 @@ use super::Found;
 use crate::film::{Film, TILE};
 use crate::integrators::{ParamDefault, ParamSpec};
 use crate::math::Rgb;
-use crate::mis::{Costs, Effort, EffortStatistics};
+use crate::mis::{Costs, Effort, EffortStatistics, Together};
 use crate::ray::{RayKind, RayStats};
 
 /// Whether to decide at all.
@@ -27,13 +27,17 @@ const PROBED: u64 = 2;
 const LOOKED_AT: u32 = 1 << 17;
 /// What a ray costs with all that belongs to it, measured in rooms of many kinds: rays of eye sub-paths and to lights; of light sub-paths and
 /// to the lens; connections with their weights.
-const COSTS: [f64; 3] = [1.0, 1.7, 3.0];
+const COSTS: [f64; 3] = [1.0, 1.1, 1.0];
+/// The same where connections are drawn from many light sub-paths and weighed by what cache points know.
+const COSTS_RESAMPLED: [f64; 3] = [1.0, 1.7, 3.0];
 
 /// What the first iterations found, and what was decided.
 #[derive(Debug)]
 pub(in crate::integrators) struct Sizing {
     statistics: Option<EffortStatistics>,
     candidates: Vec<Effort>,
+    /// A pixel's connections are all to its own light sub-path, if it has one.
+    shared_light_paths: bool,
     costs: Costs,
     probed: u64,
     decided: Option<Effort>,
@@ -42,7 +46,7 @@ pub(in crate::integrators) struct Sizing {
 impl Sizing {
     /// Undecided. Light sub-paths that serve both the light image and connections are not told apart.
     pub fn new(shared_light_paths: bool) -> Sizing {
-        let steps: &[f32] = &[1.0, 0.25, 0.0625];
+        let steps = [1.0, 0.25, 0.0625];
         let candidates = match shared_light_paths {
             true => steps.iter().map(|&both| Effort { light_image: both, connections: both }).collect(),
             false => [1.0, 0.25, 0.0625, 0.015_625]
@@ -50,7 +54,7 @@ impl Sizing {
                 .flat_map(|light_image| steps.iter().map(move |&connections| Effort { light_image, connections }))
                 .collect(),
         };
-        Sizing { statistics: None, candidates, costs: Costs::default(), probed: 0, decided: None }
+        Sizing { statistics: None, candidates, shared_light_paths, costs: Costs::default(), probed: 0, decided: None }
     }
 
     /// The effort of iteration `index`.
@@ -78,17 +82,29 @@ impl Sizing {
         let candidates = &self.candidates;
         let statistics =
             self.statistics.get_or_insert_with(|| EffortStatistics::new(candidates.clone(), film.tiles.len()));
-        for f in found {
+        let region_of = |f: &Found| {
             let (x, y) = (f.x.wrapping_sub(film.x0), f.y.wrapping_sub(film.y0));
-            if x < film.width && y < film.height {
-                let region = (y / TILE * columns + x / TILE) as usize;
-                statistics.add(region, square(f.raw * f.weight.own) * f64::from(every), &f.weight);
+            (x < film.width && y < film.height).then(|| (y / TILE * columns + x / TILE) as usize)
+        };
+        let mut together = vec![];
+        for f in found {
+            let Some(region) = region_of(f) else { continue };
+            let value = f.raw * f.weight.own;
+            statistics.add(region, square(value) * f64::from(every), &f.weight);
+            if self.shared_light_paths && f.t >= 2 {
+                together.push(((f.y, f.x), region, Together { value, weight: f.weight, connection: f.s >= 2 }));
             }
         }
+        together.sort_by_key(|(pixel, ..)| *pixel);
+        for sample in together.chunk_by(|(a, ..), (b, ..)| a == b).filter(|sample| sample.len() > 1) {
+            let contributions: Vec<Together> = sample.iter().map(|(.., c)| *c).collect();
+            statistics.add_together(sample[0].1, &contributions, f64::from(every));
+        }
         let rays = |kinds: &[RayKind]| kinds.iter().map(|k| stats.kinds[*k as usize].rays as f64).sum::<f64>();
-        self.costs.base += COSTS[0] * rays(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect]);
-        self.costs.light_image += COSTS[1] * rays(&[RayKind::Light, RayKind::LightBounce, RayKind::ShadowLens]);
-        self.costs.connections += COSTS[2] * rays(&[RayKind::ShadowConnection]);
+        let each = if self.shared_light_paths { COSTS } else { COSTS_RESAMPLED };
+        self.costs.base += each[0] * rays(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect]);
+        self.costs.light_image += each[1] * rays(&[RayKind::Light, RayKind::LightBounce, RayKind::ShadowLens]);
+        self.costs.connections += each[2] * rays(&[RayKind::ShadowConnection]);
         self.probed += 1;
         if self.probed == PROBED && film.iterations == PROBED {
             self.decided = Some(statistics.best(&variances(film), &self.costs));
