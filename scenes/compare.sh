@@ -45,8 +45,8 @@ add() {
 }
 for figure in ${FIGURES:-}; do
     case $figure in
-    methods) add bdpt pcbpt ris two-stage ;;
-    caching) add bdpt ic-bdpt skeleton ;;
+    methods) add bdpt:skip=never pcbpt ris two-stage ;;
+    caching) add bdpt:skip=never ic-bdpt skeleton ;;
     paths) for m in 50 100 200 400 800; do add "ris:paths=$m" "two-stage:second_stage=$m"; done ;;
     samples) for n in 1 2 4; do add "ris:samples=$n" "two-stage:samples=$n"; done ;;
     neighbours) for n in 0 1 3; do add "ris:neighbours=$n" "two-stage:neighbours=$n"; done ;;

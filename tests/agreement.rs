@@ -56,7 +56,8 @@ fn the_path_tracer_agrees_with_mitsuba() {
 fn every_integrator_agrees_with_the_path_tracer() {
     for name in GALLERY {
         let scene = prepared(exhibit(name));
-        let reference = Picture::render(&path::SPEC, &scene, &[("heuristic", "power")], SPP, 100);
+        let power = [("heuristic", "power")];
+        let reference = Picture::render(&path::SPEC, &scene, &power, SPP, 100);
         for spec in unbiased().chain([&importance::IMPORTANCE_CACHING]).filter(|s| takes(s, &scene)) {
             for heuristic in ["balance", "power"] {
                 if heuristic == "power" && spec.params.iter().all(|p| p.name != "heuristic") {
@@ -64,10 +65,19 @@ fn every_integrator_agrees_with_the_path_tracer() {
                 }
                 let paths = if spec.name == "importance-caching" { "1024" } else { "100" };
                 let params = [("heuristic", heuristic), ("paths", paths)];
-                let picture = Picture::render(spec, &scene, &params, SPP, 250);
                 // Virtual lights near a surface have no variance to judge by: 1/d² is all that they weigh.
                 let tolerance = if spec.name == "importance-caching" { 0.002 } else { 0.0 };
-                picture.assert_agrees(&reference, tolerance, &format!("{} ({heuristic}): {name}", spec.name));
+                let picture = Picture::render(spec, &scene, &params, SPP, 250);
+                // So many comparisons fail by chance now and then. What is really different is so at four times the samples.
+                if let Some(difference) = picture.difference(&reference, tolerance) {
+                    let closer = Picture::render(spec, &scene, &params, 4 * SPP, 1250);
+                    let reference = Picture::render(&path::SPEC, &scene, &power, 4 * SPP, 1100);
+                    closer.assert_agrees(
+                        &reference,
+                        tolerance,
+                        &format!("{} ({heuristic}): {name}: {difference}, and again", spec.name),
+                    );
+                }
             }
         }
     }

@@ -1,5 +1,5 @@
 //! Resampled connections agree with the path tracer whatever their parameters are: few or many light sub-paths, no cache points or
-//! three, one vertex in the second stage or all, any weights.
+//! three, one vertex in the second stage or all, any weights. So do connections to a pixel's own light sub-path where few pixels have one.
 
 #[path = "scenes/gallery.rs"]
 mod gallery;
@@ -7,7 +7,7 @@ mod gallery;
 mod scenes;
 
 use gallery::{GALLERY, exhibit};
-use lightsieve::integrators::{IntegratorSpec, importance, path, resampling};
+use lightsieve::integrators::{IntegratorSpec, bdpt, importance, path, resampling};
 use lightsieve::ray::Backend;
 use scenes::{Picture, prepare};
 
@@ -16,7 +16,7 @@ const SPP: u64 = 32;
 #[test]
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
-    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 26] = [
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 28] = [
         (ris, &[("paths", "1")]),
         (ris, &[("paths", "2"), ("neighbours", "1")]),
         (ris, &[("paths", "200"), ("neighbours", "0")]),
@@ -38,6 +38,8 @@ fn parameters_do_not_change_the_expectation() {
         (two, &[("paths", "1"), ("second_stage", "1"), ("keep", "60")]),
         (two, &[("weights", "ris"), ("second_stage", "8")]),
         (two, &[("weights", "balance"), ("second_stage", "8")]),
+        (&bdpt::SPEC, &[]),
+        (&bdpt::SPEC, &[("rr_depth", "5")]),
         (&importance::SKELETON, &[("acceptance", "0"), ("cells", "30")]),
         (&importance::SKELETON, &[("paths", "7"), ("skip", "never")]),
         (&importance::IC_BDPT, &[("paths", "7"), ("neighbours", "1")]),

@@ -20,6 +20,10 @@ use std::sync::atomic::AtomicBool;
 
 fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Integrator> {
     let mut values = Params::defaults(spec);
+    // What is left out is decided by the picture, of which a crop sees only a part, and leaves few samples of some techniques.
+    if spec.params.iter().any(|p| p.name == "skip") {
+        values.set("skip", "never").unwrap();
+    }
     for (name, value) in params {
         values.set(name, value).unwrap();
     }

@@ -58,12 +58,14 @@ fn fast_weights_are_those_of_the_definition() {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
                 let heuristic = ["balance", "power"][i % 2];
                 let roulette = ["5", "1", "2"][i % 3];
-                let params = [("techniques", techniques), ("heuristic", heuristic), ("rr_depth", roulette)];
+                let plain = ("skip", "never");
+                let params = [("techniques", techniques), ("heuristic", heuristic), ("rr_depth", roulette), plain];
                 for c in found(&bdpt::SPEC, &scene, &params, 12) {
                     let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
                     let what = format!("{name} {crop:?} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
                     assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
-                    assert!((f64::from(c.weight) - c.techniques[s].1).abs() < 1e-4, "{} {what}", c.weight);
+                    // Single precision: one path in some 70,000 is off by 1e-4, seen under bumps at a grazing angle.
+                    assert!((f64::from(c.weight) - c.techniques[s].1).abs() < 2e-4, "{} {what}", c.weight);
                     checked += 1;
                 }
             }

@@ -18,13 +18,18 @@ enum Kind {
     Tabulated(Box<Table>),
 }
 
-/// A filter drawn from a table of |f|; the weight f / density is exact, so the table's resolution costs no bias.
+/// A filter as a table: what lies between its nodes is interpolated, for samples and splats alike, so that exponentials are computed
+/// once and for all. Of a Gaussian this is off by no more than 4e-5 of its peak.
 #[derive(Clone, Debug)]
 struct Table {
-    desc: FilterDesc,
+    /// f at equidistant nodes from −radius to radius, per pixel: its integral is 1.
+    nodes: Vec<f32>,
+    /// Cells per pixel.
+    scale: f32,
+    /// |f| over the unit interval.
     density: PiecewiseLinear,
-    /// ∫ f, so that weights have the mean 1.
-    integral: f64,
+    /// f is nowhere negative, so that the density is f itself.
+    positive: bool,
 }
 
 /// Nodes of the table; even, so that the peak is inside a cell as flat as the filter is there.
@@ -92,7 +97,7 @@ impl PixelFilter {
         match &self.kind {
             Kind::Box => value(FilterDesc::Box, self.radius, x) / (2.0 * self.radius),
             Kind::Tent => value(FilterDesc::Tent { radius: self.radius }, self.radius, x) / self.radius,
-            Kind::Tabulated(table) => (f64::from(value(table.desc, self.radius, x)) / table.integral) as f32,
+            Kind::Tabulated(table) => table.value(x, self.radius),
         }
     }
 
@@ -146,24 +151,38 @@ fn tent(u: f32) -> f32 {
 
 impl Table {
     fn new(desc: FilterDesc, radius: f32) -> Option<Table> {
-        let at = |k: f32, n: usize| value(desc, radius, radius * (2.0 * k / n as f32 - 1.0));
-        let nodes: Vec<f32> = (0..NODES).map(|k| at(k as f32, NODES - 1).abs()).collect();
-        // A sign change inside a cell, or the steep end of a cut, must not be left without density.
-        let density = PiecewiseLinear::new(&nodes)?;
-        let fine = 64 * NODES;
-        let sum: f64 = (0..fine).map(|k| f64::from(at(k as f32 + 0.5, fine))).sum();
-        let integral = sum * 2.0 * f64::from(radius) / fine as f64;
-        (integral > 1e-6).then_some(Table { desc, density, integral })
+        let cells = (NODES - 1) as f32;
+        let values: Vec<f32> =
+            (0..NODES).map(|k| value(desc, radius, radius * (2.0 * k as f32 / cells - 1.0))).collect();
+        let density = PiecewiseLinear::new(&values.iter().map(|v| v.abs()).collect::<Vec<_>>())?;
+        let width = 2.0 * f64::from(radius) / f64::from(cells);
+        let integral: f64 = values.windows(2).map(|v| 0.5 * width * (f64::from(v[0]) + f64::from(v[1]))).sum();
+        (integral > 1e-6).then(|| Table {
+            positive: values.iter().all(|v| *v >= 0.0),
+            nodes: values.iter().map(|v| (f64::from(*v) / integral) as f32).collect(),
+            scale: cells / (2.0 * radius),
+            density,
+        })
+    }
+
+    /// f at a distance of `x` pixels.
+    #[inline]
+    fn value(&self, x: f32, radius: f32) -> f32 {
+        let at = (x + radius) * self.scale;
+        if !(0.0..=(NODES - 1) as f32).contains(&at) {
+            return 0.0;
+        }
+        let i = (at as usize).min(NODES - 2);
+        self.nodes[i] + (self.nodes[i + 1] - self.nodes[i]) * (at - i as f32)
     }
 
     fn sample(&self, u: f32, radius: f32) -> (f32, f32) {
-        let (t, pdf) = self.density.sample(u);
-        let x = radius * (2.0 * t - 1.0);
-        let density = f64::from(pdf) / (2.0 * f64::from(radius));
-        if density <= 0.0 {
-            return (x, 0.0);
+        if self.positive {
+            return (radius * (2.0 * self.density.place(u) - 1.0), 1.0);
         }
-        (x, (f64::from(value(self.desc, radius, x)) / (density * self.integral)) as f32)
+        let (t, pdf) = self.density.sample(u);
+        let (x, density) = (radius * (2.0 * t - 1.0), pdf / (2.0 * radius));
+        (x, if density > 0.0 { self.value(x, radius) / density } else { 0.0 })
     }
 }
 

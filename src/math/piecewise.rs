@@ -83,14 +83,19 @@ impl PiecewiseLinear {
 
     /// A position in [0, 1] and its density.
     pub fn sample(&self, u: f32) -> (f32, f32) {
+        let x = self.place(u);
+        (x, self.pdf(x))
+    }
+
+    /// The position of [`PiecewiseLinear::sample`].
+    pub fn place(&self, u: f32) -> f32 {
         let u = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON));
         let cells = self.values.len() - 1;
         let part = ((u * cells as f64) as usize).min(cells - 1);
         let i = find_cell(self.guide[part] as usize..self.guide[part + 1] as usize + 1, u, |k| self.cdf[k]);
         let r = (u - self.cdf[i]) / (self.cdf[i + 1] - self.cdf[i]);
         let s = invert_linear(self.values[i], self.values[i + 1], r);
-        let x = ((i as f64 + s) / (self.values.len() - 1) as f64) as f32;
-        (x, self.pdf(x))
+        ((i as f64 + s) / cells as f64) as f32
     }
 
     /// Density at `x`; zero outside of [0, 1].

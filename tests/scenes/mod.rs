@@ -122,7 +122,14 @@ impl Picture {
 
     /// Fails unless the expectations of both pictures are the same up to `tolerance` (relative), at [`SIGNIFICANCE`].
     pub fn assert_agrees(&self, other: &Picture, tolerance: f64, what: &str) {
-        assert_eq!(self.mean.len(), other.mean.len(), "{what}");
+        if let Some(difference) = self.difference(other, tolerance) {
+            panic!("{what}: {difference}");
+        }
+    }
+
+    /// What speaks against the expectations of both pictures being the same up to `tolerance` (relative), at [`SIGNIFICANCE`].
+    pub fn difference(&self, other: &Picture, tolerance: f64) -> Option<String> {
+        assert_eq!(self.mean.len(), other.mean.len());
         let tests = 3 * self.mean.len();
         // Šidák 1967: so many independent tests, all passed with the probability 1 − SIGNIFICANCE.
         let per_test = 1.0 - (1.0 - SIGNIFICANCE).powf(1.0 / tests as f64);
@@ -141,10 +148,12 @@ impl Picture {
                 }
             }
         }
-        assert!(worst.0 >= per_test, "{what}: p = {:e} < {per_test:e} in {}", worst.0, worst.1);
+        if worst.0 < per_test {
+            return Some(format!("p = {:e} < {per_test:e} in {}", worst.0, worst.1));
+        }
         let p = chance(self.whole, other.whole, freedom, tolerance);
         let ((a, va), (b, vb)) = (self.whole, other.whole);
-        assert!(p >= SIGNIFICANCE, "{what}: p = {p:e} in the mean: {a} ± {} and {b} ± {}", va.sqrt(), vb.sqrt());
+        (p < SIGNIFICANCE).then(|| format!("p = {p:e} in the mean: {a} ± {} and {b} ± {}", va.sqrt(), vb.sqrt()))
     }
 }
 

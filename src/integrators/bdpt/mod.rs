@@ -76,7 +76,7 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
             default: ParamDefault::Choice("balance", &["balance", "power"]),
         },
         TECHNIQUES,
-        sizing::parameter("never"),
+        sizing::parameter("auto"),
     ],
     unbiased: true,
     refuses: |_| None,
