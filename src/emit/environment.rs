@@ -139,7 +139,8 @@ impl EnvironmentLight {
         })
     }
 
-    fn pdf_position(&self) -> AreaPdf {
+    /// Density per unit area of the place on the disk that an emitted ray starts on.
+    pub(super) fn pdf_position(&self) -> AreaPdf {
         AreaPdf(1.0 / (PI * self.radius * self.radius))
     }
 

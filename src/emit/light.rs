@@ -93,6 +93,16 @@ impl Light {
         }
     }
 
+    /// [`Light::pdf_emission_given_vertex`] of the ray back along `sample`, which [`Light::sample_direct`] drew. An environment is seen
+    /// alike from everywhere, so that its density is known already.
+    #[inline]
+    pub fn pdf_emission_given_sample(&self, sample: &DirectSample) -> (AreaPdf, SolidAnglePdf) {
+        match self {
+            Light::Environment(l) => (l.pdf_position(), sample.pdf),
+            _ => self.pdf_emission_given_vertex(-sample.wi),
+        }
+    }
+
     /// Luminance of the emitted flux: the weight of the light when one is chosen. Positive wherever light is emitted.
     pub fn power(&self) -> f32 {
         match self {

@@ -202,7 +202,7 @@ impl EyeHooks<'_, '_> {
         if raw.is_black() {
             return;
         }
-        let (position, emission) = light.pdf_emission_given_vertex(-sample.wi);
+        let (position, emission) = light.pdf_emission_given_sample(&sample);
         let drawn = position.0 * emission.0 * lights.pmf(id).0;
         let origin = Origin {
             light: id,
