@@ -92,7 +92,7 @@ pub struct RenderStats {
     pub ns_per_ray: BTreeMap<&'static str, f64>,
     /// Rays per wall second.
     pub rays_per_s: f64,
-    /// Share of the render's wall time (all threads) inside ray queries, 0 … 1.
+    /// Share of the render's wall time (all threads) inside ray queries, 0 … 1, each as long as it takes by itself (see `ray::tracer`).
     pub ray_query_share: f64,
     /// Largest resident memory.
     pub peak_rss_bytes: Option<u64>,

@@ -9,6 +9,8 @@
 //! * t = 1: y_{s−1} is connected to the lens and lands in whatever pixel sees it: the light image, to which all W · H light
 //!   sub-paths of the full film contribute, also when only part of the picture is rendered.
 //!
+//! By default only some pixels get a light sub-path where more would not pay (`sizing`); weights know how many.
+//!
 //! Weights are `mis`'s. Shadow rays wait in queues and go out in packets; nothing depends on how these were filled.
 
 pub(super) mod eye_path;
