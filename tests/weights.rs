@@ -64,7 +64,7 @@ fn fast_weights_are_those_of_the_definition() {
                     let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
                     let what = format!("{name} {crop:?} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
                     assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
-                    // Single precision: one path in some 70,000 is off by 1e-4, seen under bumps at a grazing angle.
+                    // Single precision: one path of more than 60,000 is off by a little more than 1e-4, under bumps.
                     assert!((f64::from(c.weight) - c.techniques[s].1).abs() < 2e-4, "{} {what}", c.weight);
                     checked += 1;
                 }
