@@ -47,6 +47,19 @@ fn weigher(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, roulet
     Weigher { techniques, heuristic, eye_limits: limits, light_limits: limits, resampled: None, lengths: None }
 }
 
+/// How far the rounding of positions, from which the definition computes directions and cosines anew, changes these: it counts on short
+/// edges and at grazing angles.
+fn rounding(path: &FullPath) -> f64 {
+    let normal = |k: usize| path.interior.get(k.wrapping_sub(1)).map(|v| v.point.ng);
+    let edge = |k: usize| {
+        let (a, b) = (path.position(k)?, path.position(k + 1)?);
+        let (length, d) = ((b - a).length(), (b - a).normalize());
+        let cos = [k, k + 1].into_iter().filter_map(normal).map(|n| n.dot(d).abs()).fold(1.0, f32::min);
+        Some(f64::from(f32::EPSILON * (a.length() + b.length()) / (length * cos)))
+    };
+    (0..path.edges()).filter_map(edge).sum()
+}
+
 const SUBSETS: [&str; 6] = ["all", "-*:1", "-0:*", "-1:*", "all,-2:2,-3:1,-0:3", "-*:1,-0:*"];
 
 #[test]
@@ -64,8 +77,9 @@ fn fast_weights_are_those_of_the_definition() {
                     let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
                     let what = format!("{name} {crop:?} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
                     assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
-                    // Single precision: one path of more than 60,000 is off by a little more than 1e-4, under bumps.
-                    assert!((f64::from(c.weight) - c.techniques[s].1).abs() < 2e-4, "{} {what}", c.weight);
+                    let error = (f64::from(c.weight) - c.techniques[s].1).abs();
+                    let tolerance = (6e-5 + c.path.as_ref().map_or(0.0, rounding)).min(2e-4);
+                    assert!(error < tolerance, "{} off by {error} > {tolerance} {what}", c.weight);
                     checked += 1;
                 }
             }
