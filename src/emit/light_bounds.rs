@@ -87,16 +87,17 @@ impl Bounds {
         0.25 * (self.max - self.min).length_squared()
     }
 
-    /// What treating the lights as one costs, by the surface area orientation heuristic.
-    pub fn cost(&self) -> f32 {
-        let thickness = 1e-3 * (self.max - self.min).max_element();
-        self.power * self.area(thickness) * self.cone.measure()
+    /// A small part of the box's extent.
+    pub fn thickness(&self) -> f32 {
+        1e-3 * (self.max - self.min).max_element()
     }
 
-    /// Surface area, with a thickness so that flat and point-like sets still tell far from near.
-    fn area(&self, thickness: f32) -> f32 {
+    /// What treating the lights as one costs, by the surface area orientation heuristic; the box gets a thickness so that flat and
+    /// point-like sets still tell far from near.
+    pub fn cost(&self, thickness: f32) -> f32 {
         let d = self.max - self.min + Vec3::splat(thickness);
-        2.0 * (d.x * d.y + d.y * d.z + d.z * d.x)
+        let area = 2.0 * (d.x * d.y + d.y * d.z + d.z * d.x);
+        self.power * area * self.cone.measure()
     }
 }
 
@@ -131,7 +132,7 @@ pub(super) fn split(items: &mut [(u32, Bounds)], even: bool) -> usize {
             (Some(a), Some(b)) => Some(a.union(*b)),
             (a, b) => a.or(*b),
         };
-        let cost = |b: Option<Bounds>| b.map(|b| b.power * b.area(thickness) * b.cone.measure());
+        let cost = |b: Option<Bounds>| b.map(|b| b.cost(thickness));
         let above: Vec<Option<f32>> = {
             let mut sum = None;
             let mut v: Vec<_> = buckets

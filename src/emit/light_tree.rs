@@ -226,7 +226,8 @@ impl Set {
         }
         while children.len() < WIDTH {
             let open = (0..children.len()).filter(|&i| !children[i].is_single());
-            let costliest = open.max_by(|&i, &j| children[i].bounds.cost().total_cmp(&children[j].bounds.cost()));
+            let cost = |i: usize| children[i].bounds.cost(children[i].bounds.thickness());
+            let costliest = open.max_by(|&i, &j| cost(i).total_cmp(&cost(j)));
             let Some((i, Some([a, b]))) = costliest.map(|i| (i, &children[i].halves)) else { break };
             children.splice(i..=i, [&**a, &**b]);
         }
