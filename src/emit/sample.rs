@@ -47,6 +47,16 @@ impl LightEnd {
         }
     }
 
+    /// What turns a density per steradian at the next vertex into one of the light vertex, in the measure of
+    /// [`LightEnd::vertex_density`]; `wo` is the unit direction of the segment, either way. A light without extent has one point.
+    #[inline]
+    pub fn spread(&self, wo: Vec3, dist2: f32) -> f32 {
+        match self {
+            LightEnd::Surface { ng, .. } => ng.dot(wo).abs() / dist2,
+            LightEnd::Point { .. } | LightEnd::Infinite => 1.0,
+        }
+    }
+
     /// Geometry term of the segment from the light vertex to a vertex whose cosine with it is `cos_next`; `wo` is the unit
     /// direction leaving the light.
     pub fn geometry(&self, wo: Vec3, cos_next: f32, dist2: f32) -> f32 {

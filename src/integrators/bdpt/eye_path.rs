@@ -265,10 +265,7 @@ impl EyeHooks<'_, '_> {
         let light = self.scene.lights.get(from.light);
         let chosen = self.scene.lights.pmf(from.light);
         // Per steradian at the eye vertex → per unit area at the light vertex.
-        let to_area = match sample.end {
-            LightEnd::Surface { ng, .. } => spread(ng.dot(sample.wi), dist2),
-            LightEnd::Point { .. } | LightEnd::Infinite => 1.0,
-        };
+        let to_area = sample.end.spread(sample.wi, dist2);
         let origin = sample.end.vertex_density(position, emission) * chosen;
         let walked = bsdf_pdf.0 * self.this.weigher.eye_limits.survival(vertex.index, vertex.bsdf);
         let (back, proposals) = (self.back(vertex, sample.wi), self.proposals_before(vertex, sample.wi));

@@ -351,11 +351,7 @@ impl WalkHooks for LightHooks<'_, '_> {
         if index == 1 {
             let emission = self.emission;
             let forward = emission.end.next_density(emission.pdf_position, emission.pdf_direction, cos, dist2);
-            let to_light = match emission.end {
-                LightEnd::Surface { ng, .. } => spread(ng.dot(emission.direction), dist2),
-                LightEnd::Point { .. } => 1.0 / dist2,
-                LightEnd::Infinite => 1.0,
-            };
+            let to_light = emission.end.spread(emission.direction, dist2);
             self.out.side.arrive(forward, to_light, eye_survival);
             self.out.next_event = self.next_event(vertex, to_light);
         } else {
