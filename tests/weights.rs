@@ -11,7 +11,7 @@ use lightsieve::integrators::replay::Contribution;
 use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, importance, resampling};
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
 use lightsieve::mis::definition::{Densities, densities};
-use lightsieve::mis::{Heuristic, Joint, Node, Split, Techniques, Weigher};
+use lightsieve::mis::{End, Heuristic, Joint, Node, Split, Techniques, Weigher};
 use lightsieve::path::{FullPath, Limits};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
@@ -140,28 +140,35 @@ fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
     let k = d.eye.len() - 1;
     const POISON: f32 = -1000.0;
     // Survival is part of both densities here.
-    let side = |n: usize, own: &dyn Fn(usize) -> f64, other: &dyn Fn(usize) -> f64, smooth: &dyn Fn(usize) -> bool| {
-        let nodes: Vec<Node> = (0..n)
-            .map(|i| Node {
-                forward: AreaPdf(own(i) as f32),
-                spread: 1.0,
-                survival: 1.0,
-                ratio: if i + 2 < n { (other(i) / own(i)) as f32 } else { POISON },
-                smooth: i + 1 < n && smooth(i),
-                ..Node::origin(AreaPdf(0.0))
-            })
-            .collect();
-        let joint = Joint {
-            arrival: AreaPdf(if n >= 1 { other(n - 1) as f32 } else { POISON }),
-            departure: SolidAnglePdf(if n >= 2 { other(n - 2) as f32 } else { POISON }),
+    let side =
+        |n: usize, own: &dyn Fn(usize) -> f64, other: &dyn Fn(usize) -> f64, smooth: &dyn Fn(usize) -> bool, end| {
+            let mut nodes: Vec<Node> = (0..n)
+                .map(|i| Node {
+                    forward: AreaPdf(own(i) as f32),
+                    spread: 1.0,
+                    survival: 1.0,
+                    ratio: if i + 2 < n { (other(i) / own(i)) as f32 } else { POISON },
+                    smooth: i + 1 < n && smooth(i),
+                    shorter: [POISON; 2],
+                    ..Node::origin(AreaPdf(0.0))
+                })
+                .collect();
+            // All but the last vertex have been left.
+            for left in 1..n {
+                weigher.sum_up(&mut nodes[..left], end);
+            }
+            let joint = Joint {
+                arrival: AreaPdf(if n >= 1 { other(n - 1) as f32 } else { POISON }),
+                departure: SolidAnglePdf(if n >= 2 { other(n - 2) as f32 } else { POISON }),
+            };
+            (nodes, joint)
         };
-        (nodes, joint)
-    };
     // A vertex has smooth events unless no edge beside it can be a connection.
     let smooth = |i: usize| i == 0 || i == k || d.joinable[i] || d.joinable[i + 1];
+    let light_end = End::Light { can_be_hit: d.joinable[0], next_event: d.next_event as f32 };
     let light = |i: usize| d.light.get(i).copied().unwrap_or(0.0);
-    let (light_nodes, light_joint) = side(s, &light, &|i| d.eye[i], &smooth);
-    let (eye_nodes, eye_joint) = side(k + 1 - s, &|i| d.eye[k - i], &|i| light(k - i), &|i| smooth(k - i));
+    let (light_nodes, light_joint) = side(s, &light, &|i| d.eye[i], &smooth, light_end);
+    let (eye_nodes, eye_joint) = side(k + 1 - s, &|i| d.eye[k - i], &|i| light(k - i), &|i| smooth(k - i), End::Lens);
     let weight = weigher.weight(&Split {
         light: &light_nodes,
         light_joint,
@@ -186,7 +193,8 @@ fn weights_of_all_techniques_sum_to_one() {
         let paths: Vec<FullPath> = found(&bdpt::SPEC, &scene, &[], 8).into_iter().filter_map(|c| c.path).collect();
         for path in &paths {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
-                let weigher = weigher(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], 5);
+                let weigher =
+                    weigher(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], [5, 2][i / 2 % 2]);
                 let d = densities(&scene, &weigher, &|_, _| 1.0, path);
                 let slow = d.weights(&weigher);
                 // A subset need not have any technique that makes the path; single precision has no densities beyond its range.

@@ -24,7 +24,7 @@ pub use proposals::{Proposal, Proposals, Shares};
 pub use resampled::{Form, Resampled, Targets, There};
 pub use side::{Lit, Node, Side, next_event, spread};
 pub use techniques::{Techniques, TechniquesError};
-pub use weigh::{Joint, Split, Weigher, Weight};
+pub use weigh::{End, Joint, Split, Weigher, Weight};
 
 use crate::math::SolidAnglePdf;
 

@@ -31,6 +31,9 @@ pub struct Node {
     pub smooth: bool,
     /// Light side: c of the connection that ends at this vertex, see `mis::resampled`.
     pub factor: f32,
+    /// Summed up shares of the techniques that use no vertices of this side but those before this one, see
+    /// [`Weigher::sum_up`](super::Weigher::sum_up). Valid once the walk has left it.
+    pub shorter: [f32; 2],
 }
 
 /// What weights that know of resampling ask about a vertex of an eye sub-path, for the light that a walk from the other end would bring.
@@ -50,7 +53,7 @@ pub struct Lit {
 
 impl Node {
     fn plain(forward: AreaPdf, spread: f32, survival: f32) -> Node {
-        Node { forward, spread, survival, ratio: 0.0, smooth: true, factor: 1.0 }
+        Node { forward, spread, survival, ratio: 0.0, smooth: true, factor: 1.0, shorter: [0.0; 2] }
     }
 
     /// The origin of a sub-path.
@@ -186,6 +189,12 @@ impl Side {
     #[inline]
     pub fn first(&self, n: usize) -> &[Node] {
         &self.nodes[..n]
+    }
+
+    /// All vertices, for sums over them.
+    #[inline]
+    pub fn nodes_mut(&mut self) -> &mut [Node] {
+        &mut self.nodes
     }
 
     /// All vertices.

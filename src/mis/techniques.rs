@@ -12,6 +12,8 @@ const SIDES: usize = 64;
 pub struct Techniques {
     /// Bit t of word s.
     on: Box<[u64; SIDES]>,
+    /// See [`Techniques::regular`].
+    regular: bool,
     /// Light sub-paths per iteration, the samples of each technique with t = 1.
     light_paths: f32,
     /// Samples of each technique with s ≥ 2 and t ≥ 2.
@@ -28,12 +30,12 @@ pub struct TechniquesError(String);
 impl Techniques {
     /// All of them, with one light sub-path per iteration.
     pub fn all() -> Techniques {
-        Techniques { on: Box::new([!0; SIDES]), light_paths: 1.0, connections: 1.0 }
+        Techniques { on: Box::new([!0; SIDES]), regular: true, light_paths: 1.0, connections: 1.0 }
     }
 
     /// None of them, with one light sub-path per iteration.
     pub fn none() -> Techniques {
-        Techniques { on: Box::new([0; SIDES]), light_paths: 1.0, connections: 1.0 }
+        Techniques { on: Box::new([0; SIDES]), regular: true, light_paths: 1.0, connections: 1.0 }
     }
 
     /// Sets the number of light sub-paths per iteration.
@@ -52,6 +54,27 @@ impl Techniques {
         for word in &mut self.on[s.start.min(SIDES)..s.end.min(SIDES)] {
             if on { *word |= mask } else { *word &= !mask }
         }
+        self.note_regularity();
+    }
+
+    fn note_regularity(&mut self) {
+        // t = 0 is not a technique, t = 1 one of its own, and lights as such are not told from others by what weights ask: (0, 1) and
+        // (1, 1) stand apart.
+        let alike = |words: &[u64], mask: u64| {
+            words.iter().all(|w| w & mask == words[0] & mask && (w & mask == 0 || w & mask == mask))
+        };
+        let many = !0b11;
+        self.regular = alike(&self.on[0..1], many)
+            && alike(&self.on[1..2], many)
+            && alike(&self.on[2..], many)
+            && alike(&self.on[2..], 0b10);
+    }
+
+    /// Techniques of a kind are all used or none of them: hits of lights, next event (t ≥ 2 for both), connections, splats of surfaces
+    /// (s ≥ 2 for both).
+    #[inline]
+    pub fn regular(&self) -> bool {
+        self.regular
     }
 
     /// From text: items separated by commas, each taking effect on what stands before it. `all` and `none` set every technique;
@@ -64,8 +87,8 @@ impl Techniques {
         let mut set = Techniques::all();
         for (i, item) in text.split(',').map(str::trim).enumerate() {
             match item {
-                "all" => set.on.fill(!0),
-                "none" => set.on.fill(0),
+                "all" => set.switch(0..SIDES, 0..SIDES, true),
+                "none" => set.switch(0..SIDES, 0..SIDES, false),
                 _ => {
                     let (on, pair) = match item.strip_prefix('-') {
                         Some(rest) => (false, rest),
@@ -74,7 +97,7 @@ impl Techniques {
                     let parsed = pair.split_once(':').and_then(|(s, t)| Some((range(s)?, range(t)?)));
                     let (s, t) = parsed.ok_or_else(|| TechniquesError(text.into()))?;
                     if i == 0 && on {
-                        set.on.fill(0);
+                        set.switch(0..SIDES, 0..SIDES, false);
                     }
                     set.switch(s, t, on);
                 }
@@ -158,6 +181,21 @@ mod tests {
         assert!(t("2:3").uses(2, 3) && !t("2:3").uses(2, 4) && !t("2:3").uses_light_image());
         assert!(t("none,+1:2").uses(1, 2) && !t("none,+1:2").uses_light_paths());
         assert!(t("all").uses(100, 100) && !t("-63:63").uses(100, 100));
+        for (list, regular) in [
+            ("all", true),
+            ("none", true),
+            ("-1:1", true),
+            ("*:1", true),
+            ("-0:*", true),
+            ("0:*,+1:*,-1:1", true),
+            ("-2:2", false),
+            ("-3:1", false),
+            ("-0:5", false),
+            ("none,+63:63", false),
+            ("-2:2,+2:2", true),
+        ] {
+            assert_eq!(t(list).regular(), regular, "{list}");
+        }
     }
 
     #[test]

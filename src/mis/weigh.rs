@@ -7,7 +7,8 @@
 //!
 //! Neighbours differ by one vertex, p_{s+1} / p_s = p_L(v_s) / p_E(v_s), so the sum is taken over products of the ratios that the two
 //! [`Side`](super::Side)s keep, going outwards from the connection. Only four ratios depend on the connection itself: those
-//! of its two end vertices and of the two vertices behind them.
+//! of its two end vertices and of the two vertices behind them. What lies farther out is summed up once, as the sub-path is made
+//! ([`Weigher::sum_up`]), so that a connection costs the same for sub-paths of any length.
 //!
 //! Factors: c_0 = 0 if no ray can meet the light by chance; c_1 = p_direct(v_0 | v_1) / p_L(v_0) where t ≥ 2, since those techniques
 //! draw their light point as seen from v_1 (*next event*) and not as light sub-paths do; `mis::resampled` tells that of a
@@ -74,6 +75,20 @@ pub struct Weigher {
     pub lengths: Option<Lengths>,
 }
 
+/// The end of the path that a side begins at.
+#[derive(Clone, Copy, Debug)]
+pub enum End {
+    /// The light.
+    Light {
+        /// c_0 = 1: rays can meet it by chance.
+        can_be_hit: bool,
+        /// c_1, from y_1 on; see [`Split::next_event`].
+        next_event: f32,
+    },
+    /// The lens.
+    Lens,
+}
+
 /// What a path's techniques weigh; all weights of a path sum to one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weight {
@@ -129,15 +144,58 @@ impl Weigher {
         }
     }
 
+    /// Shares of techniques do not depend on what the other side is like, so that they can be summed up ahead.
+    #[inline]
+    fn sums_ahead(&self, end: &End) -> bool {
+        // c of a resampled connection depends on the light that comes to the eye's vertices.
+        self.techniques.regular() && (matches!(end, End::Light { .. }) || self.resampled.is_none())
+    }
+
+    /// Sums up, once a walk has left v_i, the last of `nodes`, the shares of the techniques that use n ≤ i of its vertices, each relative to
+    /// the one that uses i of them and has the share 1: S_i = share(i) + r_{i−1} S_{i−1}, where r is p_other / p_own of a vertex. There are two
+    /// sums, of connections and of all others, which are of one kind on each side.
+    ///
+    /// Roulette is taken as played at all these vertices; where S_i is used, it is.
+    #[inline]
+    pub fn sum_up(&self, nodes: &mut [Node], end: End) {
+        if !self.sums_ahead(&end) {
+            return;
+        }
+        let Some(i) = nodes.len().checked_sub(1) else { return };
+        let many = 2;
+        let share = match (end, i) {
+            (End::Light { can_be_hit, .. }, 0) => self.techniques.count(0, many) * f32::from(u8::from(can_be_hit)),
+            (End::Light { next_event, .. }, 1) => self.techniques.count(1, many) * next_event,
+            (End::Lens, 0) => 0.0,
+            (End::Lens, 1) => self.techniques.count(many, 1),
+            _ => self.techniques.count(many, many) * nodes[i].factor,
+        };
+        let mut sums = [0.0; 2];
+        if i == 0 || nodes[i - 1].smooth && nodes[i].smooth {
+            sums[usize::from(i >= 2)] = self.heuristic.power(share);
+        }
+        if i > 0 {
+            let ratio = self.heuristic.power(nodes[i - 1].ratio * nodes[i].survival);
+            for (sum, shorter) in sums.iter_mut().zip(nodes[i - 1].shorter) {
+                // Nothing stays nothing, whatever the ratio.
+                if shorter > 0.0 {
+                    *sum += ratio * shorter;
+                }
+            }
+        }
+        nodes[i].shorter = sums;
+    }
+
     /// Adds up, by kind, the shares of the techniques that have fewer than all vertices of `side`, relative to the one that has all of them and the
     /// factor 1; `other` is the number of vertices of the other side, `share(n)` the share of the technique with n vertices on this side,
-    /// with its kind.
+    /// with its kind. `ahead` is the kind of what [`Weigher::sum_up`] has summed up beside connections, if it has.
     #[inline]
     fn outward(
         &self,
         side: &[Node],
         joint: &Joint,
         other: usize,
+        ahead: Option<usize>,
         sums: &mut [f32; KINDS],
         mut share: impl FnMut(usize) -> (f32, usize),
     ) {
@@ -154,6 +212,18 @@ impl Weigher {
             };
             product *= self.heuristic.power(ratio);
             if product == 0.0 {
+                break;
+            }
+            if let Some(kind) = ahead
+                && i + 2 < n
+                && n - 2 - i + other >= self.eye_limits.roulette_from as usize
+                && side[i].shorter.iter().all(|sum| sum.is_finite())
+            {
+                for (kind, sum) in [kind, CONNECTIONS].into_iter().zip(side[i].shorter) {
+                    if sum > 0.0 {
+                        sums[kind] += product * sum;
+                    }
+                }
                 break;
             }
             // The technique's connection is the edge from vertex i − 1 to vertex i of this side.
@@ -204,11 +274,13 @@ impl Weigher {
         let own = self.heuristic.power(self.share(s, t, path, path.factor));
         let mut sums = [0.0; KINDS];
         sums[Self::kind(s, t)] = own;
-        self.outward(path.light, &path.light_joint, t, &mut sums, |n| {
+        let ahead = |end: End, kind: usize| self.sums_ahead(&end).then_some(kind);
+        let light = End::Light { can_be_hit: path.light_can_be_hit, next_event: path.next_event };
+        self.outward(path.light, &path.light_joint, t, ahead(light, OTHERS), &mut sums, |n| {
             (self.share(n, edges - n, path, path.light[n].factor), Self::kind(n, edges - n))
         });
         let mut arriving = path.arriving;
-        self.outward(path.eye, &path.eye_joint, s, &mut sums, |n| {
+        self.outward(path.eye, &path.eye_joint, s, ahead(End::Lens, LIGHT_IMAGE), &mut sums, |n| {
             let factor = match &self.resampled {
                 None => 1.0,
                 Some(resampled) => self.eye_factor(resampled, path, n, &mut arriving),

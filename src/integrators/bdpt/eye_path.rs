@@ -12,7 +12,7 @@ use crate::integrators::resampling::store::LightStore;
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::definition::Joined;
-use crate::mis::{self, Joint, Node, Proposals, Resampled, Side, Split, Targets, There, Weight, spread};
+use crate::mis::{self, End, Joint, Node, Proposals, Resampled, Side, Split, Targets, There, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, direct_segment};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, segment};
@@ -423,6 +423,7 @@ impl WalkHooks for EyeHooks<'_, '_> {
 
     fn leaving(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample) {
         let reverse = self.side.leave(vertex, sample, Transport::Importance);
+        self.this.weigher.sum_up(self.side.nodes_mut(), End::Lens);
         // Nothing else asks for what light would do here on its way.
         if self.this.weigher.resampled.is_some() {
             let there = self.there(vertex.point, sample.wi);

@@ -6,7 +6,7 @@ use crate::integrators::replay::{Contribution, Replay};
 use crate::math::sampler::{PathSampler, Purpose};
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::definition::Joined;
-use crate::mis::{self, Joint, Lit, Node, Resampled, Side, Split, Targets, Weight, spread};
+use crate::mis::{self, End, Joint, Lit, Node, Resampled, Side, Split, Targets, Weigher, Weight, spread};
 use crate::path::{Edge, Origin, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, walk};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::{SegmentEnd, offset_point, segment};
@@ -65,6 +65,13 @@ pub(in crate::integrators) struct LightPath {
 }
 
 impl LightPath {
+    /// Sums up shares for weights of paths that go beyond its last vertex, which the walk has just left.
+    #[inline]
+    fn sum_up(&mut self, weigher: &Weigher) {
+        let end = End::Light { can_be_hit: self.light_can_be_hit, next_event: self.next_event };
+        weigher.sum_up(self.side.nodes_mut(), end);
+    }
+
     /// Forgets its vertices, but not its memory.
     pub fn clear(&mut self) {
         self.vertices.clear();
@@ -95,6 +102,8 @@ pub(in crate::integrators) fn trace(
     let origin = emission.vertex_density() * chosen;
     out.side.begin(origin, false);
     out.light_can_be_hit = !light.is_delta();
+    out.next_event = 0.0;
+    out.sum_up(&this.weigher);
     let flux = emission.flux() * (1.0 / chosen.0);
     out.origin = Some(Origin { light: id, end: emission.end, leaving: emission.direction, flux });
     // Cache points near a vertex are asked about the vertex before.
@@ -391,6 +400,7 @@ impl WalkHooks for LightHooks<'_, '_> {
     fn leaving(&mut self, vertex: &SurfaceVertex, sample: &BsdfSample) {
         self.luminance_before = vertex.throughput.luminance();
         self.out.side.leave(vertex, sample, Transport::Radiance);
+        self.out.sum_up(&self.this.weigher);
         if let Some(record) = &mut self.record {
             record.leaving(false, sample);
         }
