@@ -61,9 +61,10 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     out!("meshes      {}", scene.geometry.meshes.len());
     out!("instances   {}", scene.geometry.instances.len());
     out!(
-        "triangles   {} ({} with vertex data)",
+        "triangles   {} ({} with vertex data, {} more as hits look them up)",
         scene.geometry.triangle_count(),
-        mib(scene.geometry.bytes() + shading)
+        mib(scene.geometry.bytes() + shading),
+        mib(scene.triangles.bytes())
     );
     out!("lights      {} (every emitting triangle is one)", scene.lights.len());
     out!("radius      {:.4}, centre {:.4} {:.4} {:.4}", scene.radius, scene.centre.x, scene.centre.y, scene.centre.z);

@@ -6,6 +6,7 @@
 //! these rules, so that callers write one formula for all lights.
 
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
+use crate::ray::offset::SegmentEnd;
 
 /// Where the light end of a segment is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +56,28 @@ impl LightEnd {
             LightEnd::Surface { ng, .. } => ng.dot(wo).abs() / dist2,
             LightEnd::Point { .. } | LightEnd::Infinite => 1.0,
         }
+    }
+
+    /// The light's end of a segment; `None` at infinity.
+    #[inline]
+    pub fn segment_end(&self) -> Option<SegmentEnd> {
+        match *self {
+            LightEnd::Surface { p, error, ng } => Some(SegmentEnd::Surface { p, error, ng }),
+            LightEnd::Point { p } => Some(SegmentEnd::Free(p)),
+            LightEnd::Infinite => None,
+        }
+    }
+
+    /// What a light sub-path carries that begins here in the unit direction `leaving` with the density `drawn` of both together, towards a
+    /// vertex at `distance`, where it arrives as `radiance` (of a point: intensity / distance²). The same as [`EmissionSample::flux`].
+    #[inline]
+    pub fn flux(&self, radiance: Rgb, leaving: Vec3, distance: f32, drawn: f32) -> Rgb {
+        let at_light = match self {
+            LightEnd::Surface { ng, .. } => ng.dot(leaving).abs(),
+            LightEnd::Point { .. } => distance * distance,
+            LightEnd::Infinite => 1.0,
+        };
+        radiance * (at_light / drawn)
     }
 
     /// Geometry term of the segment from the light vertex to a vertex whose cosine with it is `cos_next`; `wo` is the unit

@@ -3,7 +3,7 @@
 //! A contribution never steers the walk, so it may arrive late. Each entry knows where it goes; entries leave in the order they came,
 //! so sums do not depend on how packets were filled.
 
-use crate::emit::{DirectSample, LightEnd};
+use crate::emit::DirectSample;
 use crate::ray::offset::{SegmentEnd, segment};
 use crate::ray::{PACKET, RayKind, Segment, SegmentPacket, Tracer};
 use crate::shade::SurfacePoint;
@@ -12,10 +12,9 @@ use crate::shade::SurfacePoint;
 #[inline]
 pub fn direct_segment(point: &SurfacePoint, light: &DirectSample) -> Segment {
     let from = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
-    match light.end {
-        LightEnd::Surface { p, error, ng } => segment(&from, &SegmentEnd::Surface { p, error, ng }),
-        LightEnd::Point { p } => segment(&from, &SegmentEnd::Free(p)),
-        LightEnd::Infinite => Segment::to_infinity(from.leaving(light.wi), light.wi),
+    match light.end.segment_end() {
+        Some(end) => segment(&from, &end),
+        None => Segment::to_infinity(from.leaving(light.wi), light.wi),
     }
 }
 

@@ -92,6 +92,11 @@ impl TriangleTable {
         table
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        std::mem::size_of_val(&self.meshes[..]) + std::mem::size_of_val(&self.triangles[..])
+    }
+
     /// Of the mesh that was hit.
     #[inline]
     pub fn mesh(&self, hit: &Hit) -> &MeshEntry {

@@ -80,17 +80,6 @@ impl<'a> Candidate<'a> {
     }
 }
 
-/// What a light sub-path carries that begins at `end` in the unit direction `leaving` with the density `drawn` of both together, towards a
-/// vertex at `distance`, where it arrives as `radiance` (of a point: intensity / distance²).
-fn flux(end: &LightEnd, radiance: Rgb, leaving: Vec3, distance: f32, drawn: f32) -> Rgb {
-    let at_light = match end {
-        LightEnd::Surface { ng, .. } => ng.dot(leaving).abs(),
-        LightEnd::Point { .. } => distance * distance,
-        LightEnd::Infinite => 1.0,
-    };
-    radiance * (at_light / drawn)
-}
-
 /// The hooks of an eye sub-path that is joined with `light`.
 pub(in crate::integrators) struct EyeHooks<'a, 'q> {
     pub this: &'a Bidirectional,
@@ -155,7 +144,7 @@ impl EyeHooks<'_, '_> {
             light: id,
             end,
             leaving: -direction,
-            flux: flux(&end, emitted, -direction, edge.distance, position.0 * emission.0 * chosen.0),
+            flux: end.flux(emitted, -direction, edge.distance, position.0 * emission.0 * chosen.0),
         };
         let next_event = if t >= 3 {
             let direct = light.pdf_direct(edge.from, direction, edge.distance)
@@ -208,7 +197,7 @@ impl EyeHooks<'_, '_> {
             light: id,
             end: sample.end,
             leaving: -sample.wi,
-            flux: flux(&sample.end, sample.radiance, -sample.wi, sample.distance, drawn),
+            flux: sample.end.flux(sample.radiance, -sample.wi, sample.distance, drawn),
         };
         let started = tracer.begin(Work::Weights);
         let weight = self.direct_weight(vertex, &origin, &sample, (density, bsdf_pdf), (position, emission));

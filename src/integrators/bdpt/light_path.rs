@@ -212,18 +212,16 @@ impl LightHooks<'_, '_> {
             _ => scene.camera.sample_lens(emission.origin, u),
         };
         let Some(lens) = sample else { return };
-        let light = scene.lights.get(self.id);
-        let (emitted, cos, to_area, segment) = match emission.end {
-            LightEnd::Infinite => {
+        let (emitted, cos, to_area, segment) = match emission.end.segment_end() {
+            None => {
                 let to_light = -emission.direction;
                 (emission.radiance, 1.0, 1.0, Segment { o: lens.p_near, d: to_light, t_max: lens.distance })
             }
-            end => {
+            Some(from) => {
                 let ng = emission.ng.unwrap_or(lens.wi);
                 let cos = ng.dot(lens.wi).max(0.0);
                 // The radiance of a textured light is the same in all directions of its front.
                 let emitted = if cos > 0.0 { emission.radiance } else { Rgb::BLACK };
-                let from = surface_end(end, emission);
                 (
                     emitted,
                     cos,
@@ -237,23 +235,7 @@ impl LightHooks<'_, '_> {
         if raw.is_black() {
             return;
         }
-        let direction = lens.pdf_direction();
-        let split = Split {
-            light: self.out.side.first(1),
-            light_joint: Joint { arrival: AreaPdf(direction.0 * to_area), departure: SolidAnglePdf(0.0) },
-            eye: &[Node::origin(lens.pdf)],
-            eye_lit: &[Lit::default()],
-            eye_proposals: None,
-            eye_joint: Joint { arrival: AreaPdf(0.0), departure: SolidAnglePdf(0.0) },
-            next_event: 1.0,
-            light_can_be_hit: !light.is_delta(),
-            factor: 1.0,
-            arriving: Rgb::BLACK,
-            adjoint: Rgb::BLACK,
-        };
-        let started = tracer.begin(Work::Weights);
-        let weight = self.this.weigher.weight(&split);
-        tracer.end(Work::Weights, started);
+        let weight = self.lens_weight(1, &lens, to_area, SolidAnglePdf(0.0), tracer);
         let filter = sampler.rng().next_4();
         self.splat(1, &lens, &segment, (raw, weight), [filter[0], filter[1]], tracer);
     }
@@ -269,12 +251,27 @@ impl LightHooks<'_, '_> {
         if raw.is_black() {
             return;
         }
-        let direction = lens.pdf_direction();
         let to_area = spread(point.ng.dot(lens.wi), lens.distance * lens.distance);
         let back = vertex.bsdf.pdf(lens.wi, vertex.wo, Transport::Radiance);
+        let weight = self.lens_weight(s, &lens, to_area, back, tracer);
+        let from = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
+        let segment = segment(&from, &SegmentEnd::Free(lens.p_near));
+        self.splat(s, &lens, &segment, (raw, weight), [u[2], u[3]], tracer);
+    }
+
+    /// Weight of the technique (s, 1) that joins y_{s−1} with `lens`: `to_area` turns a density per steradian at the lens into one per unit
+    /// area at y_{s−1}, from where a walk that came from the lens would go on to the vertex before with the density `back`.
+    fn lens_weight(
+        &self,
+        s: usize,
+        lens: &LensSample,
+        to_area: f32,
+        back: SolidAnglePdf,
+        tracer: &mut Tracer,
+    ) -> Weight {
         let split = Split {
             light: self.out.side.first(s),
-            light_joint: Joint { arrival: AreaPdf(direction.0 * to_area), departure: back },
+            light_joint: Joint { arrival: AreaPdf(lens.pdf_direction().0 * to_area), departure: back },
             eye: &[Node::origin(lens.pdf)],
             eye_lit: &[Lit::default()],
             eye_proposals: None,
@@ -288,9 +285,7 @@ impl LightHooks<'_, '_> {
         let started = tracer.begin(Work::Weights);
         let weight = self.this.weigher.weight(&split);
         tracer.end(Work::Weights, started);
-        let from = SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng };
-        let segment = segment(&from, &SegmentEnd::Free(lens.p_near));
-        self.splat(s, &lens, &segment, (raw, weight), [u[2], u[3]], tracer);
+        weight
     }
 
     /// c of the connection that ends at `vertex`, where the sub-path came with the area density `forward`.
@@ -339,15 +334,6 @@ impl LightHooks<'_, '_> {
         };
         let direct = light.pdf_direct(vertex.point.p, vertex.wo, distance) * picked;
         mis::next_event(direct, to_area, self.out.side.first(1)[0].forward)
-    }
-}
-
-/// The light's end of a segment.
-fn surface_end(end: LightEnd, emission: &EmissionSample) -> SegmentEnd {
-    match end {
-        LightEnd::Surface { p, error, ng } => SegmentEnd::Surface { p, error, ng },
-        LightEnd::Point { p } => SegmentEnd::Free(p),
-        LightEnd::Infinite => SegmentEnd::Free(emission.origin),
     }
 }
 
