@@ -79,16 +79,6 @@ impl LightEnd {
         };
         radiance * (at_light / drawn)
     }
-
-    /// Geometry term of the segment from the light vertex to a vertex whose cosine with it is `cos_next`; `wo` is the unit
-    /// direction leaving the light.
-    pub fn geometry(&self, wo: Vec3, cos_next: f32, dist2: f32) -> f32 {
-        match *self {
-            LightEnd::Surface { ng, .. } => ng.dot(wo).abs() * cos_next.abs() / dist2,
-            LightEnd::Point { .. } => cos_next.abs() / dist2,
-            LightEnd::Infinite => cos_next.abs(),
-        }
-    }
 }
 
 /// Light arriving at a reference point from one sampled point (or direction) of one light.
