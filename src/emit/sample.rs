@@ -69,7 +69,7 @@ impl LightEnd {
     }
 
     /// What a light sub-path carries that begins here in the unit direction `leaving` with the density `drawn` of both together, towards a
-    /// vertex at `distance`, where it arrives as `radiance` (of a point: intensity / distance²). The same as [`EmissionSample::flux`].
+    /// vertex at `distance`, where it arrives as `radiance` (of a point: intensity / distance²).
     #[inline]
     pub fn flux(&self, radiance: Rgb, leaving: Vec3, distance: f32, drawn: f32) -> Rgb {
         let at_light = match self {
@@ -128,8 +128,8 @@ pub struct EmissionSample {
 impl EmissionSample {
     /// Flux carried: radiance · |cos θ at the light| / density. Its expectation is the light's flux per channel.
     pub fn flux(&self) -> Rgb {
-        let cos = self.ng.map_or(1.0, |n| n.dot(self.direction).abs());
-        self.radiance * (cos / (self.pdf_position.0 * self.pdf_direction.0))
+        // The radiance of a point is its intensity: what arrives at distance one.
+        self.end.flux(self.radiance, self.direction, 1.0, self.pdf_position.0 * self.pdf_direction.0)
     }
 
     /// Area density of the light vertex (see [`LightEnd::vertex_density`]).

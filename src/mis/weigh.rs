@@ -107,13 +107,13 @@ const LIGHT_IMAGE: usize = 1;
 const CONNECTIONS: usize = 2;
 
 impl Weigher {
-    /// n_s c_s, connectability apart; `factor` is c where connections are resampled.
+    /// n_s c_s, connectability apart; of the light it is asked whether c_0 = 1, and c_1; `factor` is c where connections are resampled.
     #[inline]
-    fn share(&self, s: usize, t: usize, path: &Split, factor: f32) -> f32 {
+    fn share(&self, s: usize, t: usize, (light_can_be_hit, next_event): (bool, f32), factor: f32) -> f32 {
         let n = self.techniques.count(s, t);
         match s {
-            0 if !path.light_can_be_hit => 0.0,
-            1 if t >= 2 => n * path.next_event,
+            0 if !light_can_be_hit => 0.0,
+            1 if t >= 2 => n * next_event,
             _ if s >= 2 && t >= 2 => n * factor,
             _ => n,
         }
@@ -162,16 +162,14 @@ impl Weigher {
             return;
         }
         let Some(i) = nodes.len().checked_sub(1) else { return };
-        let many = 2;
-        let share = match (end, i) {
-            (End::Light { can_be_hit, .. }, 0) => self.techniques.count(0, many) * f32::from(u8::from(can_be_hit)),
-            (End::Light { next_event, .. }, 1) => self.techniques.count(1, many) * next_event,
-            (End::Lens, 0) => 0.0,
-            (End::Lens, 1) => self.techniques.count(many, 1),
-            _ => self.techniques.count(many, many) * nodes[i].factor,
+        // Any number from two on stands for the other side's vertices.
+        let (technique, light) = match end {
+            End::Light { can_be_hit, next_event } => ((i, 2), (can_be_hit, next_event)),
+            End::Lens => ((2, i), (false, 0.0)),
         };
         let mut sums = [0.0; 2];
         if i == 0 || nodes[i - 1].smooth && nodes[i].smooth {
+            let share = self.share(technique.0, technique.1, light, nodes[i].factor);
             sums[usize::from(i >= 2)] = self.heuristic.power(share);
         }
         if i > 0 {
@@ -271,13 +269,14 @@ impl Weigher {
     pub fn weight(&self, path: &Split) -> Weight {
         let (s, t) = (path.light.len(), path.eye.len());
         let edges = s + t;
-        let own = self.heuristic.power(self.share(s, t, path, path.factor));
+        let light = (path.light_can_be_hit, path.next_event);
+        let own = self.heuristic.power(self.share(s, t, light, path.factor));
         let mut sums = [0.0; KINDS];
         sums[Self::kind(s, t)] = own;
         let ahead = |end: End, kind: usize| self.sums_ahead(&end).then_some(kind);
-        let light = End::Light { can_be_hit: path.light_can_be_hit, next_event: path.next_event };
-        self.outward(path.light, &path.light_joint, t, ahead(light, OTHERS), &mut sums, |n| {
-            (self.share(n, edges - n, path, path.light[n].factor), Self::kind(n, edges - n))
+        let begin = End::Light { can_be_hit: path.light_can_be_hit, next_event: path.next_event };
+        self.outward(path.light, &path.light_joint, t, ahead(begin, OTHERS), &mut sums, |n| {
+            (self.share(n, edges - n, light, path.light[n].factor), Self::kind(n, edges - n))
         });
         let mut arriving = path.arriving;
         self.outward(path.eye, &path.eye_joint, s, ahead(End::Lens, LIGHT_IMAGE), &mut sums, |n| {
@@ -285,7 +284,7 @@ impl Weigher {
                 None => 1.0,
                 Some(resampled) => self.eye_factor(resampled, path, n, &mut arriving),
             };
-            (self.share(edges - n, n, path, factor), Self::kind(edges - n, n))
+            (self.share(edges - n, n, light, factor), Self::kind(edges - n, n))
         });
         let scale = 1.0 / (sums[OTHERS] + sums[LIGHT_IMAGE] + sums[CONNECTIONS]);
         Weight { own: own * scale, light_image: sums[LIGHT_IMAGE] * scale, connections: sums[CONNECTIONS] * scale }
