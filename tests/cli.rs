@@ -285,8 +285,10 @@ fn pictures_are_compared() {
 }
 
 /// Every integrator of the program.
+/// All integrators, and one whose pixels share light sub-paths.
 fn integrators() -> impl Iterator<Item = &'static str> {
-    lightsieve::integrators::REGISTRY.iter().map(|s| s.name)
+    let shared = "bdpt -p light_paths=1/4 -p connections=1/2";
+    lightsieve::integrators::REGISTRY.iter().map(|s| s.name).chain([shared])
 }
 
 #[test]
@@ -388,7 +390,8 @@ fn a_crop_is_a_part_of_the_whole() {
     let sandbox = Sandbox::new();
     for i in integrators() {
         // A part of the picture may be worth other numbers of samples than the whole.
-        let listed = sandbox.run(&format!("list -i {i}")).expect(0, &[]).stdout;
+        let name = i.split(' ').next().unwrap();
+        let listed = sandbox.run(&format!("list -i {name}")).expect(0, &[]).stdout;
         let skip = if listed.contains("  skip ") { "-p skip=never" } else { "" };
         render(&sandbox, &format!("-i {i} {skip} -o whole.pfm --size 40x24"));
         render(&sandbox, &format!("-i {i} {skip} -o part.pfm --size 40x24 --crop 9,5,20,11"));

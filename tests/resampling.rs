@@ -1,5 +1,5 @@
 //! Resampled connections agree with the path tracer whatever their parameters are: few or many light sub-paths, no cache points or
-//! three, one vertex in the second stage or all, any weights. So do connections to a pixel's own light sub-path where few pixels have one.
+//! three, one vertex in the second stage or all, any weights. So do connections to a light sub-path that pixels share, of which few are made.
 
 #[path = "scenes/gallery.rs"]
 mod gallery;
@@ -16,7 +16,7 @@ const SPP: u64 = 32;
 #[test]
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
-    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 28] = [
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 31] = [
         (ris, &[("paths", "1")]),
         (ris, &[("paths", "2"), ("neighbours", "1")]),
         (ris, &[("paths", "200"), ("neighbours", "0")]),
@@ -40,6 +40,9 @@ fn parameters_do_not_change_the_expectation() {
         (two, &[("weights", "balance"), ("second_stage", "8")]),
         (&bdpt::SPEC, &[]),
         (&bdpt::SPEC, &[("rr_depth", "5")]),
+        (&bdpt::SPEC, &[("light_paths", "1/4"), ("connections", "1/2")]),
+        (&bdpt::SPEC, &[("light_paths", "1/16"), ("connections", "1/16"), ("heuristic", "power")]),
+        (&bdpt::SPEC, &[("light_paths", "1/16"), ("skip", "never")]),
         (&importance::SKELETON, &[("acceptance", "0"), ("cells", "30")]),
         (&importance::SKELETON, &[("paths", "7"), ("skip", "never")]),
         (&importance::IC_BDPT, &[("paths", "7"), ("neighbours", "1")]),

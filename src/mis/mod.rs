@@ -18,7 +18,7 @@ pub mod side;
 pub mod techniques;
 pub mod weigh;
 
-pub use effort::{Costs, Effort, EffortStatistics, Together};
+pub use effort::{Contribution, Costs, Effort, EffortStatistics};
 pub use lengths::Lengths;
 pub use proposals::{Proposal, Proposals, Shares};
 pub use resampled::{Form, Resampled, Targets, There};

@@ -43,6 +43,11 @@ impl Techniques {
         self.light_paths = light_paths;
     }
 
+    /// The light sub-paths of an iteration that are connected to the lens.
+    pub fn light_paths(&self) -> f32 {
+        self.light_paths
+    }
+
     /// Sets the number of samples that an eye vertex takes of each connection with s ≥ 2.
     pub fn set_connections(&mut self, connections: f32) {
         self.connections = connections;

@@ -80,6 +80,17 @@ impl<'a> Candidate<'a> {
     }
 }
 
+/// A set in which each number of 0 … 63 is by itself with the probability `effort`, a power of two of at most one.
+#[inline]
+fn thinned(effort: f32, sampler: &mut PathSampler) -> u64 {
+    let (mut set, mut share) = (u64::MAX, 1.0);
+    while share > effort {
+        set &= sampler.rng().next_u64();
+        share *= 0.5;
+    }
+    set
+}
+
 /// The hooks of an eye sub-path that is joined with `light`.
 pub(in crate::integrators) struct EyeHooks<'a, 'q> {
     pub this: &'a Bidirectional,
@@ -393,9 +404,14 @@ impl WalkHooks for EyeHooks<'_, '_> {
             let light = self.light;
             let started = tracer.begin(Work::Connections);
             match &this.resampler {
+                None if light.vertices.is_empty() => {}
                 None => {
-                    for y in light.vertices.iter().filter(|y| possible(y.length())) {
-                        self.connect(vertex, &Candidate::of(light, y, 1.0 / this.effort.connections), tracer);
+                    let effort = this.effort.connections;
+                    let chosen = thinned(effort, sampler);
+                    for (number, y) in light.vertices.iter().enumerate() {
+                        if chosen >> (number % 64) & 1 == 1 && possible(y.length()) {
+                            self.connect(vertex, &Candidate::of(light, y, 1.0 / effort), tracer);
+                        }
                     }
                 }
                 Some(resampler) => {

@@ -1,22 +1,19 @@
 //! Which light sub-paths an iteration traces, and what it takes from them: splats, and vertices to draw from.
 
 use super::light_path::{self, LensQueue};
+use super::sharing::{Sharing, contains};
 use super::worker::{Piece, Worker, splat};
-use super::{Bidirectional, CHOICE_STREAM, Found, LIGHT_PATHS_AT_ONCE, LIGHT_STREAM};
+use super::{Bidirectional, Found, LIGHT_PATHS_AT_ONCE, LIGHT_STREAM};
 use crate::integrators::resampling::store::{LightStore, Part};
 use crate::integrators::{Iteration, Replay};
-use crate::math::hash::HashRng;
 use crate::math::sampler::PathSampler;
-use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 use rayon::prelude::*;
 
 impl Bidirectional {
-    /// Pixel `number` has a light sub-path in this iteration.
-    pub(super) fn has_light_path(&self, iteration: &Iteration, number: u32) -> bool {
-        let effort = self.effort.light_image;
-        effort >= 1.0
-            || HashRng::new(iteration.seed, CHOICE_STREAM, u64::from(number), iteration.index).next_f32() < effort
+    /// How pixels share light sub-paths in an iteration.
+    pub(super) fn sharing(&self, iteration: &Iteration) -> Sharing {
+        Sharing::new(iteration.scene.film_size, self.effort.light_image, iteration.seed, iteration.index)
     }
 
     /// Pixels have light sub-paths of their own.
@@ -24,11 +21,13 @@ impl Bidirectional {
         self.connects || self.weigher.techniques.uses_light_image()
     }
 
-    /// Light sub-paths of an iteration for the light image: one for every pixel of the full film, or fewer; where pixels choose whether
-    /// they have one, the number that is expected.
-    pub(super) fn light_paths(&self, scene: &PreparedScene) -> f32 {
-        let all = scene.film_size[0] as f32 * scene.film_size[1] as f32 * self.effort.light_image;
-        if self.resampler.is_some() { all.ceil() } else { all }
+    /// Light sub-paths of an iteration for the light image: one for every pixel of the full film, or fewer.
+    pub(super) fn light_paths(&self, iteration: &Iteration) -> f32 {
+        if self.resampler.is_none() {
+            return self.sharing(iteration).paths() as f32;
+        }
+        let [width, height] = iteration.scene.film_size.map(|n| n as f32);
+        (width * height * self.effort.light_image).ceil()
     }
 
     /// Random numbers of light sub-path `path`.
@@ -37,7 +36,7 @@ impl Bidirectional {
         PathSampler::new(iteration.seed, LIGHT_STREAM, iteration.index, u64::from(path))
     }
 
-    /// One light sub-path and its splats.
+    /// One light sub-path: its vertices and its splats, as far as they are wanted.
     pub(super) fn light_path(
         &self,
         iteration: &Iteration,
@@ -45,7 +44,7 @@ impl Bidirectional {
         worker: &mut Worker,
         tracer: &mut Tracer,
         record: Option<&mut Replay>,
-        keep_vertices: bool,
+        (keep_vertices, splats_it): (bool, bool),
     ) {
         let mut sampler = self.light_sampler(iteration, path);
         let (splats, all) = (&mut worker.splats, &mut worker.found);
@@ -62,7 +61,7 @@ impl Bidirectional {
             &mut sampler,
             tracer,
             &mut worker.light,
-            Some(&mut lens),
+            splats_it.then_some(&mut lens),
             record,
             keep_vertices,
         );
@@ -77,7 +76,7 @@ impl Bidirectional {
     ) -> Vec<Piece> {
         let scene = iteration.scene;
         let splat = match self.weigher.techniques.uses_light_image() {
-            true => self.light_paths(scene) as u32,
+            true => self.weigher.techniques.light_paths() as u32,
             false => 0,
         };
         let all = splat.max(kept);
@@ -87,7 +86,7 @@ impl Bidirectional {
             for path in first..all.min(first + LIGHT_PATHS_AT_ONCE) {
                 let keep = path < kept;
                 if path < splat {
-                    self.light_path(iteration, path, worker, &mut tracer, None, keep);
+                    self.light_path(iteration, path, worker, &mut tracer, None, (keep, true));
                 } else {
                     let mut sampler = self.light_sampler(iteration, path);
                     light_path::trace(self, scene, &mut sampler, &mut tracer, &mut worker.light, None, None, keep);
@@ -105,16 +104,15 @@ impl Bidirectional {
         kept_parts.chain(others).enumerate().map_init(Worker::new, one_piece).collect()
     }
 
-    /// Light sub-paths that belong to pixels outside of the window: only their splats matter.
-    pub(super) fn light_only(&self, iteration: &Iteration, paths: std::ops::Range<u32>, worker: &mut Worker) -> Piece {
+    /// Light sub-paths in a row of blocks whose owners are outside of the window: only their splats matter.
+    pub(super) fn light_only(&self, iteration: &Iteration, rows: [u32; 4], worker: &mut Worker) -> Piece {
         let scene = iteration.scene;
         let mut tracer = Tracer::new(&*scene.query);
-        let [x0, y0, width, height] = scene.window;
-        for path in paths {
-            let (x, y) = (path % scene.film_size[0], path / scene.film_size[0]);
-            let outside = x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height;
-            if outside && self.has_light_path(iteration, path) {
-                self.light_path(iteration, path, worker, &mut tracer, None, false);
+        let sharing = self.sharing(iteration);
+        for slot in sharing.slots_in(rows) {
+            let owner = sharing.owner(slot);
+            if contains([0, 0, scene.film_size[0], scene.film_size[1]], owner) && !contains(scene.window, owner) {
+                self.light_path(iteration, sharing.path(slot), worker, &mut tracer, None, (false, true));
             }
         }
         worker.finish(self, tracer)

@@ -160,7 +160,7 @@ struct LightHooks<'a, 'q> {
 impl LightHooks<'_, '_> {
     /// Number of light sub-paths, by which every splat is divided.
     fn paths(&self) -> f32 {
-        self.this.light_paths(self.scene)
+        self.this.weigher.techniques.light_paths()
     }
 
     /// Sends a contribution on its way to the pixel where the lens sees it.

@@ -9,13 +9,14 @@
 //! * t = 1: y_{s−1} is connected to the lens and lands in whatever pixel sees it: the light image, to which all W · H light
 //!   sub-paths of the full film contribute, also when only part of the picture is rendered.
 //!
-//! By default only some pixels get a light sub-path where more would not pay (`sizing`); weights know how many.
+//! By default pixels share light sub-paths, and only some are connected, where more would not pay (`sizing`, `sharing`); weights know.
 //!
 //! Weights are `mis`'s. Shadow rays wait in queues and go out in packets; nothing depends on how these were filled.
 
 pub(super) mod eye_path;
 mod light_pass;
 pub(super) mod light_path;
+mod sharing;
 pub(super) mod sizing;
 mod worker;
 
@@ -26,11 +27,12 @@ use crate::math::Rgb;
 use crate::math::sampler::PathSampler;
 use crate::mis::{Effort, Heuristic, Techniques, Weigher, Weight};
 use crate::path::{Limits, WalkStart, walk};
-use crate::prepared::{Features, PreparedScene};
+use crate::prepared::Features;
 use crate::ray::{Phases, Ray, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use eye_path::{Arrival, EyeHooks, EyeQueues};
 use rayon::prelude::*;
+use sharing::contains;
 use sizing::Sizing;
 pub(super) use worker::Piece;
 use worker::{Harvest, Worker, add_to};
@@ -79,6 +81,8 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
         },
         TECHNIQUES,
         sizing::parameter("auto"),
+        sizing::LIGHT_PATHS,
+        sizing::CONNECTIONS,
     ],
     unbiased: true,
     refuses: |_| None,
@@ -86,9 +90,14 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
     build: |params| {
         let heuristic = if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power };
         let mut this = Bidirectional::new(params, heuristic, params.techniques("techniques"));
-        // What is known of other numbers of samples holds for the balance heuristic.
-        if params.choice("skip") == "auto" && heuristic == Heuristic::Balance {
-            this.size_by_scene();
+        let mut candidates = sizing::candidates(params);
+        if heuristic == Heuristic::Power {
+            // What is known of other numbers of samples holds for the balance heuristic.
+            candidates.truncate(1);
+        }
+        match candidates[..] {
+            [only] => this.settled = only,
+            _ => this.sizing = Some(Sizing::new(candidates)),
         }
         Box::new(this)
     },
@@ -134,7 +143,9 @@ pub(super) struct Bidirectional {
     pub(super) resampler: Option<Resampler>,
     /// How many samples of each kind of technique this iteration takes.
     pub(super) effort: Effort,
-    /// Where that is decided, if it is.
+    /// The same for all iterations, unless it is decided.
+    settled: Effort,
+    /// Where it is decided.
     sizing: Option<Sizing>,
     /// Contributions of every n-th sub-path are wanted by themselves in this iteration.
     every: Option<u32>,
@@ -164,6 +175,7 @@ impl Bidirectional {
             },
             resampler: None,
             effort: Effort::FULL,
+            settled: Effort::FULL,
             sizing: None,
             every: None,
             samples: vec![],
@@ -171,15 +183,15 @@ impl Bidirectional {
         }
     }
 
-    /// From now on, numbers of samples are decided by the scene.
+    /// From now on, numbers of samples of resampled connections and of splats are decided by the scene.
     pub(super) fn size_by_scene(&mut self) {
-        let shared = self.resampler.is_none();
-        self.sizing = Some(Sizing::new(shared));
+        self.sizing = Some(Sizing::resampled());
     }
 
     /// Settles the effort of iteration `index`.
-    fn begin(&mut self, scene: &PreparedScene, index: u64) {
-        self.effort = self.sizing.as_ref().map_or(Effort::FULL, |s| s.effort(index));
+    fn begin(&mut self, iteration: &Iteration) {
+        let (scene, index) = (iteration.scene, iteration.index);
+        self.effort = self.sizing.as_ref().map_or(self.settled, |s| s.effort(index));
         let pixels = scene.film_size[0] * scene.film_size[1];
         self.every = match &self.pyramid {
             Some(_) => Some(1),
@@ -188,7 +200,7 @@ impl Bidirectional {
         let samples = self.resampler.as_ref().map_or(1, |r| r.settings.samples);
         let techniques = &mut self.weigher.techniques;
         techniques.set_connections(samples as f32 * self.effort.connections);
-        let light_paths = self.light_paths(scene);
+        let light_paths = self.light_paths(iteration);
         self.weigher.techniques.set_light_paths(light_paths);
     }
 
@@ -257,18 +269,24 @@ impl Bidirectional {
                 all.push(found);
             }
         };
-        let techniques = &self.weigher.techniques;
-        for pixel in 0..tile.pixels() {
-            let (x, y) = tile.pixel(pixel);
-            let number = y * scene.film_size[0] + x;
-            if !self.resamples() && self.uses_light_paths() {
-                match self.has_light_path(iteration, number) {
-                    true => self.light_path(iteration, number, worker, &mut tracer, None, self.connects),
-                    false => worker.light.clear(),
-                }
+        let eye_paths = self.weigher.techniques.uses_eye_paths();
+        if self.resamples() || !self.uses_light_paths() {
+            for pixel in (0..tile.pixels()).filter(|_| eye_paths) {
+                self.eye_path(iteration, tile.pixel(pixel), worker, &mut tracer, &mut found, None);
             }
-            if techniques.uses_eye_paths() {
-                self.eye_path(iteration, (x, y), worker, &mut tracer, &mut found, None);
+        } else {
+            let window = [tile.x0, tile.y0, tile.width, tile.height];
+            let sharing = self.sharing(iteration);
+            for slot in sharing.slots_in(window) {
+                let splats_it = contains(window, sharing.owner(slot));
+                let wants_it = self.connects && sharing.pixels(slot).any(|pixel| contains(window, pixel));
+                if splats_it || wants_it {
+                    let path = sharing.path(slot);
+                    self.light_path(iteration, path, worker, &mut tracer, None, (self.connects, splats_it));
+                }
+                for [x, y] in sharing.pixels(slot).filter(|pixel| eye_paths && contains(window, *pixel)) {
+                    self.eye_path(iteration, (x, y), worker, &mut tracer, &mut found, None);
+                }
             }
         }
         worker.direct.flush(&mut tracer, |f| found(Arrival::Direct, f));
@@ -281,7 +299,7 @@ impl Bidirectional {
 impl Integrator for Bidirectional {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
         let scene = iteration.scene;
-        self.begin(scene, iteration.index);
+        self.begin(iteration);
         let mut harvest = Harvest::default();
         if self.resamples() {
             let (stats, pieces) = self.prepare_resampling(iteration);
@@ -302,11 +320,10 @@ impl Integrator for Bidirectional {
 
         let light_image = this.weigher.techniques.uses_light_image().then(|| {
             if !this.resamples() && scene.features.contains(Features::CROP) {
-                let all = scene.film_size[0] * scene.film_size[1];
+                let [width, height] = scene.film_size;
                 let outside =
-                    (0..all.div_ceil(LIGHT_PATHS_AT_ONCE)).into_par_iter().map_init(Worker::new, |worker, chunk| {
-                        let first = chunk * LIGHT_PATHS_AT_ONCE;
-                        this.light_only(iteration, first..all.min(first + LIGHT_PATHS_AT_ONCE), worker)
+                    (0..height.div_ceil(sharing::SIDE)).into_par_iter().map_init(Worker::new, |worker, row| {
+                        this.light_only(iteration, [0, row * sharing::SIDE, width, sharing::SIDE], worker)
                     });
                 harvest.add(phases.time("light paths outside of the crop", || outside.collect()));
             }
@@ -326,7 +343,7 @@ impl Integrator for Bidirectional {
         if let (Some(sizing), Some(every)) = (&mut self.sizing, self.every)
             && sizing.every(iteration.index, 1).is_some()
         {
-            sizing.learn(film, harvest.found.iter().flatten(), every, &harvest.stats);
+            sizing.learn((film, scene.film_size), harvest.found.iter().flatten(), every, &harvest.stats);
         }
         if let Some(pyramid) = &mut self.pyramid {
             for f in harvest.found.iter().flatten() {
@@ -387,19 +404,23 @@ impl Integrator for Bidirectional {
                 self.iterate(&Iteration { index, ..*iteration }, &mut film);
             });
         }
-        self.begin(scene, iteration.index);
+        self.begin(iteration);
         self.prepare_replay(iteration);
         let (mut worker, mut tracer, mut replay) =
             (Worker::new(), Tracer::new(&*scene.query), Replay { pixel: (x, y), ..Replay::default() });
         let mut seen = vec![];
-        let path = y * scene.film_size[0] + x;
-        let own = if self.resamples() {
-            (path as f32) < self.light_paths(scene)
+        let sharing = self.sharing(iteration);
+        let slot = sharing.slot_of([x, y]);
+        // The first sub-paths of all stand for those that candidates are drawn from.
+        let (path, own) = if self.resamples() {
+            let path = y * scene.film_size[0] + x;
+            (path, self.weigher.techniques.light_paths() > path as f32)
         } else {
-            self.has_light_path(iteration, path)
+            (sharing.path(slot), sharing.owner(slot) == [x, y])
         };
-        if own && self.uses_light_paths() {
-            self.light_path(iteration, path, &mut worker, &mut tracer, Some(&mut replay), self.connects);
+        if (own || self.connects) && self.uses_light_paths() {
+            let wanted = (self.connects, own);
+            self.light_path(iteration, path, &mut worker, &mut tracer, Some(&mut replay), wanted);
             // One sub-path may fill a packet and more: what has been answered already is among the splats.
             seen.extend(worker.splats.drain(..).map(|s| s.note));
             worker.lens.flush(&mut tracer, |f| seen.push(f.note));

@@ -2,17 +2,17 @@
 //!
 //! The first two iterations take all of them, and are part of the picture like any other. Their samples tell what other numbers would
 //! cost and be worth (`mis::effort`); the best setting holds from then on. No kind is ever given up: what the first iterations did not
-//! meet could be rare and bright, so that a sixteenth of the connections and a sixty-fourth of the light image always stay. The decision depends on
+//! meet could be rare and bright, so that a sixteenth of the connections and a sixteenth or, where they serve the light image only,
+//! a sixty-fourth of the light sub-paths always stay. Nor do too many pixels share one: their noise is alike, and no sum of squares tells. The decision depends on
 //! earlier iterations only, so every iteration is unbiased, and on counts of rays instead of times, so it is the same for any machine.
 
 use super::Found;
 use crate::film::{Film, TILE};
-use crate::integrators::{ParamDefault, ParamSpec};
-use crate::math::Rgb;
-use crate::mis::{Costs, Effort, EffortStatistics, Together};
+use crate::integrators::{ParamDefault, ParamSpec, Params};
+use crate::mis::{Contribution, Costs, Effort, EffortStatistics};
 use crate::ray::{RayKind, RayStats};
 
-/// Whether to decide at all.
+/// Whether to decide.
 pub(in crate::integrators) const fn parameter(default: &'static str) -> ParamSpec {
     ParamSpec {
         name: "skip",
@@ -21,13 +21,51 @@ pub(in crate::integrators) const fn parameter(default: &'static str) -> ParamSpe
     }
 }
 
+/// Numbers of samples as fractions of the full ones, for people.
+const FRACTIONS: [(&str, f32); 6] =
+    [("1", 1.0), ("1/2", 0.5), ("1/4", 0.25), ("1/8", 0.125), ("1/16", 0.0625), ("1/64", 0.015_625)];
+/// Light sub-paths.
+pub(super) const LIGHT_PATHS: ParamSpec = ParamSpec {
+    name: "light_paths",
+    about: "light sub-paths per pixel, each joined with as many pixels as that leaves; auto: as skip says",
+    default: ParamDefault::Choice("auto", &["auto", "1", "1/4", "1/16"]),
+};
+/// Connections.
+pub(super) const CONNECTIONS: ParamSpec = ParamSpec {
+    name: "connections",
+    about: "share of the connections of an eye sub-path with its light sub-path that are made; auto: as skip says",
+    default: ParamDefault::Choice("auto", &["auto", "1", "1/2", "1/4", "1/8", "1/16"]),
+};
+
+/// What may be decided where connections are not resampled.
+pub(super) fn candidates(params: &Params) -> Vec<Effort> {
+    let choices = |spec: &ParamSpec| -> Vec<f32> {
+        let ParamDefault::Choice(auto, all) = spec.default else { return vec![1.0] };
+        let wanted = |name: &str| match (params.choice(spec.name), params.choice("skip")) {
+            (chosen, _) if chosen != auto => name == chosen,
+            (_, "never") => name == "1",
+            _ => true,
+        };
+        FRACTIONS.iter().filter(|(name, _)| all.contains(name) && wanted(name)).map(|(_, value)| *value).collect()
+    };
+    let (light_paths, connections) = (choices(&LIGHT_PATHS), choices(&CONNECTIONS));
+    pairs(&light_paths, &connections)
+}
+
+fn pairs(light_image: &[f32], connections: &[f32]) -> Vec<Effort> {
+    light_image
+        .iter()
+        .flat_map(|&light_image| connections.iter().map(move |&connections| Effort { light_image, connections }))
+        .collect()
+}
+
 /// Iterations at full effort.
 const PROBED: u64 = 2;
 /// Sub-paths whose contributions are looked at, about, in each of them.
-const LOOKED_AT: u32 = 1 << 17;
+const LOOKED_AT: u32 = 1 << 15;
 /// What a ray costs with all that belongs to it, measured in rooms of many kinds: rays of eye sub-paths and to lights; of light sub-paths and
 /// to the lens; connections with their weights.
-const COSTS: [f64; 3] = [1.0, 1.1, 1.0];
+const COSTS: [f64; 3] = [1.0, 1.2, 0.7];
 /// The same where connections are drawn from many light sub-paths and weighed by what cache points know.
 const COSTS_RESAMPLED: [f64; 3] = [1.0, 1.7, 3.0];
 
@@ -36,25 +74,23 @@ const COSTS_RESAMPLED: [f64; 3] = [1.0, 1.7, 3.0];
 pub(in crate::integrators) struct Sizing {
     statistics: Option<EffortStatistics>,
     candidates: Vec<Effort>,
-    /// A pixel's connections are all to its own light sub-path, if it has one.
-    shared_light_paths: bool,
+    /// What a ray costs.
+    each: [f64; 3],
     costs: Costs,
     probed: u64,
     decided: Option<Effort>,
 }
 
 impl Sizing {
-    /// Undecided. Light sub-paths that serve both the light image and connections are not told apart.
-    pub fn new(shared_light_paths: bool) -> Sizing {
-        let steps = [1.0, 0.25, 0.0625];
-        let candidates = match shared_light_paths {
-            true => steps.iter().map(|&both| Effort { light_image: both, connections: both }).collect(),
-            false => [1.0, 0.25, 0.0625, 0.015_625]
-                .into_iter()
-                .flat_map(|light_image| steps.iter().map(move |&connections| Effort { light_image, connections }))
-                .collect(),
-        };
-        Sizing { statistics: None, candidates, shared_light_paths, costs: Costs::default(), probed: 0, decided: None }
+    /// Undecided among `candidates`.
+    pub fn new(candidates: Vec<Effort>) -> Sizing {
+        Sizing { statistics: None, candidates, each: COSTS, costs: Costs::default(), probed: 0, decided: None }
+    }
+
+    /// Undecided, where connections are resampled.
+    pub fn resampled() -> Sizing {
+        let candidates = pairs(&[1.0, 0.25, 0.0625, 0.015_625], &[1.0, 0.25, 0.0625]);
+        Sizing { each: COSTS_RESAMPLED, ..Sizing::new(candidates) }
     }
 
     /// The effort of iteration `index`.
@@ -75,39 +111,55 @@ impl Sizing {
         if self.decided.is_none() { index.min(PROBED) } else { 0 }
     }
 
-    /// Takes in one of the first iterations, whose film it is; `found` are the visible contributions of every n-th sub-path. Decides
-    /// after the last.
-    pub fn learn<'a>(&mut self, film: &Film, found: impl Iterator<Item = &'a Found>, every: u32, stats: &RayStats) {
+    /// Takes in one of the first iterations, whose film it is, of a picture of the size `full`; `found` are the visible contributions of every
+    /// n-th sub-path. Decides after the last.
+    pub fn learn<'a>(
+        &mut self,
+        (film, full): (&Film, [u32; 2]),
+        found: impl Iterator<Item = &'a Found>,
+        every: u32,
+        stats: &RayStats,
+    ) {
         let columns = film.width.div_ceil(TILE);
+        let pixels = (full[0] * full[1]).div_ceil(every);
         let candidates = &self.candidates;
-        let statistics =
-            self.statistics.get_or_insert_with(|| EffortStatistics::new(candidates.clone(), film.tiles.len()));
-        let region_of = |f: &Found| {
-            let (x, y) = (f.x.wrapping_sub(film.x0), f.y.wrapping_sub(film.y0));
+        let statistics = self
+            .statistics
+            .get_or_insert_with(|| EffortStatistics::new(candidates.clone(), film.tiles.len(), pixels as usize));
+        let region_of = |(x, y): (u32, u32)| {
+            let (x, y) = (x.wrapping_sub(film.x0), y.wrapping_sub(film.y0));
             (x < film.width && y < film.height).then(|| (y / TILE * columns + x / TILE) as usize)
         };
-        let mut together = vec![];
+        let (mut of_pixels, times) = (vec![], f64::from(every));
         for f in found {
-            let Some(region) = region_of(f) else { continue };
-            let value = f.raw * f.weight.own;
-            statistics.add(region, square(value) * f64::from(every), &f.weight);
-            if self.shared_light_paths && f.t >= 2 {
-                together.push(((f.y, f.x), region, Together { value, weight: f.weight, connection: f.s >= 2 }));
+            let Some(region) = region_of((f.x, f.y)) else { continue };
+            let contribution = Contribution { value: f.raw * f.weight.own, weight: f.weight, connection: f.s >= 2 };
+            statistics.add(region, &contribution, times);
+            if f.t >= 2 {
+                of_pixels.push((f.y * full[0] + f.x, contribution));
             }
         }
-        together.sort_by_key(|(pixel, ..)| *pixel);
-        for sample in together.chunk_by(|(a, ..), (b, ..)| a == b).filter(|sample| sample.len() > 1) {
-            let contributions: Vec<Together> = sample.iter().map(|(.., c)| *c).collect();
-            statistics.add_together(sample[0].1, &contributions, f64::from(every));
+        // In the order in which they were found, so that sums have the same bits.
+        of_pixels.sort_by_key(|(pixel, _)| *pixel);
+        let mut of_pixels = of_pixels.chunk_by(|(a, _), (b, _)| a == b).peekable();
+        for number in 0..pixels {
+            let pixel = number * every;
+            let contributions: Vec<Contribution> = of_pixels
+                .next_if(|sample| sample[0].0 == pixel)
+                .map_or(vec![], |sample| sample.iter().map(|(_, c)| *c).collect());
+            if let Some(region) = region_of((pixel % full[0], pixel / full[0])) {
+                statistics.add_sample((region, number as usize), self.probed > 0, &contributions, times);
+            }
         }
         let rays = |kinds: &[RayKind]| kinds.iter().map(|k| stats.kinds[*k as usize].rays as f64).sum::<f64>();
-        let each = if self.shared_light_paths { COSTS } else { COSTS_RESAMPLED };
+        let each = self.each;
         self.costs.base += each[0] * rays(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect]);
         self.costs.light_image += each[1] * rays(&[RayKind::Light, RayKind::LightBounce, RayKind::ShadowLens]);
         self.costs.connections += each[2] * rays(&[RayKind::ShadowConnection]);
         self.probed += 1;
         if self.probed == PROBED && film.iterations == PROBED {
             self.decided = Some(statistics.best(&variances(film), &self.costs));
+            self.statistics = None;
         }
     }
 
@@ -123,7 +175,7 @@ impl Sizing {
         let decided = self.decided.map_or([0.0; 2], |e| [e.light_image, e.connections].map(f64::from));
         let mut state = vec![self.probed as f64, base, light_image, connections, decided[0], decided[1]];
         if self.decided.is_none() {
-            state.extend(self.statistics.iter().flat_map(EffortStatistics::sums));
+            state.extend(self.statistics.iter().flat_map(EffortStatistics::saved));
         }
         state
     }
@@ -140,16 +192,9 @@ impl Sizing {
         if sums.is_empty() {
             return true;
         }
-        let mut statistics = EffortStatistics::new(self.candidates.clone(), tiles);
-        let fits = statistics.restore(sums);
-        self.statistics = Some(statistics);
-        fits
+        self.statistics = EffortStatistics::restored(self.candidates.clone(), tiles, sums);
+        self.statistics.is_some()
     }
-}
-
-/// Mean square of the channels.
-fn square(value: Rgb) -> f64 {
-    value.to_array().iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / 3.0
 }
 
 /// For each tile the sum over samples of their variance, and its mean, squared.

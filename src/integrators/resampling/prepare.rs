@@ -204,10 +204,11 @@ impl Bidirectional {
     /// Goes on from a saved state.
     pub(in crate::integrators) fn restore_resampling(&mut self, iteration: &Iteration, bytes: &[u8]) -> bool {
         let mut words = bytes.chunks_exact(8).map(|c| u64::from_le_bytes(c.try_into().unwrap_or_default()));
+        // Rays that place caches belong to the first iteration, whose costs are known already.
+        self.place(iteration, &mut RayStats::default());
         let (Some(iterations), Some(vertices), Some(paths)) = (words.next(), words.next(), words.next()) else {
             return bytes.is_empty();
         };
-        self.place(iteration, &mut RayStats::default());
         let sums: Vec<f64> = words.map(f64::from_bits).collect();
         let Some(resampler) = &mut self.resampler else { return false };
         resampler.seen = [vertices, paths];
