@@ -38,6 +38,15 @@ impl LightEnd {
         }
     }
 
+    /// What leads on from the light vertex: the density per steradian of the emission's direction; of a light at infinity, the density per
+    /// unit area of its disk.
+    pub fn departure(&self, position: AreaPdf, direction: SolidAnglePdf) -> SolidAnglePdf {
+        match self {
+            LightEnd::Infinite => SolidAnglePdf(position.0),
+            _ => direction,
+        }
+    }
+
     /// Area density of the vertex that follows the light vertex on an emission ray; `cos_next` is the cosine at that vertex
     /// between its normal and the segment, `dist2` the segment's squared length (unused at infinity).
     pub fn next_density(&self, position: AreaPdf, direction: SolidAnglePdf, cos_next: f32, dist2: f32) -> AreaPdf {

@@ -87,8 +87,8 @@ pub struct EffortStatistics {
     first: Vec<[f32; 3]>,
 }
 
-/// Gains smaller than this are not worth a change.
-const LEAST_GAIN: f64 = 0.95;
+/// For smaller gains than this connections are not left out: two iterations do not tell more exactly.
+const LEAST_GAIN: f64 = 0.9;
 
 impl EffortStatistics {
     /// Nothing known of `regions` regions, of which so many `pixels` will be looked at.
@@ -147,7 +147,7 @@ impl EffortStatistics {
         }
     }
 
-    /// The candidate with the least product of variance and cost. `variances` has for each region the sum over samples of their variance at
+    /// The candidate with the least product of variance and cost, or of those that are nearly as good the one with most connections. `variances` has for each region the sum over samples of their variance at
     /// full effort, and of its mean, squared, by which it counts; a share of the mean over all regions keeps dark ones from counting
     /// too much.
     pub fn best(&self, variances: &[(f64, f64)], costs: &Costs) -> Effort {
@@ -164,15 +164,16 @@ impl EffortStatistics {
                 .sum();
             variance * self.candidates[number].cost(costs)
         };
-        let full = self.candidates.iter().position(|c| *c == Effort::FULL).map_or(f64::INFINITY, product);
-        let mut best = (Effort::FULL, full * LEAST_GAIN);
-        for (number, candidate) in self.candidates.iter().enumerate() {
-            let product = product(number);
-            if product < best.1 {
-                best = (*candidate, product);
-            }
-        }
-        best.0
+        let products: Vec<f64> = (0..self.candidates.len()).map(product).collect();
+        let least = products.iter().copied().fold(f64::INFINITY, f64::min);
+        let good = self.candidates.iter().zip(products).filter(|(_, product)| *product <= least / LEAST_GAIN);
+        let order = |a: &(&Effort, f64), b: &(&Effort, f64)| {
+            a.0.connections
+                .total_cmp(&b.0.connections)
+                .then(b.1.total_cmp(&a.1))
+                .then(a.0.light_image.total_cmp(&b.0.light_image))
+        };
+        good.max_by(order).map_or(Effort::FULL, |(effort, _)| *effort)
     }
 
     /// All that is known, to be saved.

@@ -148,9 +148,7 @@ impl EyeHooks<'_, '_> {
         let light = lights.get(id);
         let chosen = lights.pmf(id);
         let (position, emission) = light.pdf_emission(-direction);
-        let (origin, departure) =
-            if light.is_infinite() { (AreaPdf(emission.0), SolidAnglePdf(position.0)) } else { (position, emission) };
-        let origin = origin * chosen;
+        let (origin, departure) = (end.vertex_density(position, emission) * chosen, end.departure(position, emission));
         let origin_of = Origin {
             light: id,
             end,

@@ -66,8 +66,8 @@ const LOOKED_AT: u32 = 1 << 15;
 /// What a ray costs with all that belongs to it, measured in rooms of many kinds: rays of eye sub-paths and to lights; of light sub-paths and
 /// to the lens; connections with their weights.
 const COSTS: [f64; 3] = [1.0, 1.2, 0.7];
-/// The same where connections are drawn from many light sub-paths and weighed by what cache points know.
-const COSTS_RESAMPLED: [f64; 3] = [1.0, 1.7, 3.0];
+/// The same where connections are drawn from many light sub-paths.
+const COSTS_RESAMPLED: [f64; 3] = [1.0, 1.2, 1.0];
 
 /// What the first iterations found, and what was decided.
 #[derive(Debug)]
@@ -89,7 +89,7 @@ impl Sizing {
 
     /// Undecided, where connections are resampled.
     pub fn resampled() -> Sizing {
-        let candidates = pairs(&[1.0, 0.25, 0.0625, 0.015_625], &[1.0, 0.25, 0.0625]);
+        let candidates = pairs(&[1.0, 0.25, 0.0625, 0.015_625], &[1.0, 0.5, 0.25, 0.125, 0.0625]);
         Sizing { each: COSTS_RESAMPLED, ..Sizing::new(candidates) }
     }
 
