@@ -5,8 +5,8 @@
 //! of technique: D′/D = Σ_kinds (n′/n) w_kind. So the samples of one setting tell the variance of any other, and with the costs of the kinds
 //! the best of them (Grittmann et al. 2022, "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms").
 //!
-//! A pixel's sample X of all techniques with t ≥ 2, one eye sub-path's, has a variance of less than that: E[X²] − E[X]², of which
-//! E[X²] also has the products of unlike contributions. In a well-lit room E[X]² is nearly all, and the second moment alone would tell that
+//! A pixel's sample X of all techniques with t ≥ 2, one eye sub-path's, has a variance of less than that: E(X²) − (E X)², of which
+//! E(X²) also has the products of unlike contributions. In a well-lit room (E X)² is nearly all, and the second moment alone would tell that
 //! splats, whose numbers in a pixel are random, are worth more than they are. With two samples X₁, X₂ of each pixel, ½ (X₁ − X₂)²
 //! is its variance at full effort, and with every contribution times n′/n D/D′ what its variance will be, but for the squares of
 //! single contributions: with fewer connections, each by itself, these fall by n′/n only once.

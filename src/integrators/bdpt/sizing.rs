@@ -3,8 +3,9 @@
 //! The first two iterations take all of them, and are part of the picture like any other. Their samples tell what other numbers would
 //! cost and be worth (`mis::effort`); the best setting holds from then on. No kind is ever given up: what the first iterations did not
 //! meet could be rare and bright, so that a sixteenth of the connections and a sixteenth or, where they serve the light image only,
-//! a sixty-fourth of the light sub-paths always stay. Nor do too many pixels share one: their noise is alike, and no sum of squares tells. The decision depends on
-//! earlier iterations only, so every iteration is unbiased, and on counts of rays instead of times, so it is the same for any machine.
+//! a sixty-fourth of the light sub-paths always stay. Nor do too many pixels share one: their noise is alike, and no sum of squares
+//! tells. The decision depends on earlier iterations only, so every iteration is unbiased, and on counts of rays instead of times, so it
+//! is the same for any machine.
 
 use super::Found;
 use crate::film::{Film, TILE};
@@ -22,8 +23,7 @@ pub(in crate::integrators) const fn parameter(default: &'static str) -> ParamSpe
 }
 
 /// Numbers of samples as fractions of the full ones, for people.
-const FRACTIONS: [(&str, f32); 6] =
-    [("1", 1.0), ("1/2", 0.5), ("1/4", 0.25), ("1/8", 0.125), ("1/16", 0.0625), ("1/64", 0.015_625)];
+const FRACTIONS: [(&str, f32); 5] = [("1", 1.0), ("1/2", 0.5), ("1/4", 0.25), ("1/8", 0.125), ("1/16", 0.0625)];
 /// Light sub-paths.
 pub(super) const LIGHT_PATHS: ParamSpec = ParamSpec {
     name: "light_paths",
