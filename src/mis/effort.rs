@@ -110,7 +110,8 @@ impl EffortStatistics {
         }
     }
 
-    /// Takes in that a pixel's sample in the first or the second iteration was made of `contributions`, each of which is also added by itself.
+    /// Takes in that a pixel's sample in the first or the second iteration was made of `contributions`, each of which is also added by
+    /// itself.
     pub fn add_sample(
         &mut self,
         (region, pixel): (usize, usize),
@@ -147,9 +148,9 @@ impl EffortStatistics {
         }
     }
 
-    /// The candidate with the least product of variance and cost, or of those that are nearly as good the one with most connections. `variances` has for each region the sum over samples of their variance at
-    /// full effort, and of its mean, squared, by which it counts; a share of the mean over all regions keeps dark ones from counting
-    /// too much.
+    /// The candidate with the least product of variance and cost, or of those that are nearly as good the one with most connections.
+    /// `variances` has for each region the sum over samples of their variance at full effort, and of its mean, squared, by which it
+    /// counts; a share of the mean over all regions keeps dark ones from counting too much.
     pub fn best(&self, variances: &[(f64, f64)], costs: &Costs) -> Effort {
         let overall = variances.iter().map(|v| v.1).sum::<f64>() / variances.len().max(1) as f64;
         let product = |number: usize| {

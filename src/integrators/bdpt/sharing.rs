@@ -4,8 +4,8 @@
 //! pixel's estimate and its weights alone, except that the light image gets fewer splats. What it costs is that the noise of pixels
 //! with one light sub-path is correlated. They are therefore kept apart, and are others in every iteration.
 //!
-//! The full film is cut into blocks of 16 × 16 pixels, as into tiles. Of the k pixels that share a light sub-path all are in one block, and one owns it:
-//! its splats are made where that pixel is rendered. So a crop knows its pixels' sub-paths without the rest of the film.
+//! The full film is cut into blocks of 16 × 16 pixels, as into tiles. The k pixels that share a light sub-path are all in one block, and
+//! one owns it: its splats are made where that pixel is rendered. So a crop knows its pixels' sub-paths without the rest of the film.
 
 use super::CHOICE_STREAM;
 use crate::math::hash::HashRng;
