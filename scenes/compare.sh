@@ -7,7 +7,7 @@
 # the papers to repeat, by the names below; without it every integrator takes part with its defaults.
 #
 #   methods      bdpt, pcbpt, ris, two-stage    Nabata et al. 2020 (weights), Figs. 1, 4, 5, 10; (two stages), Figs. 5, 11
-#   caching      bdpt, ic-bdpt, skeleton        Noel and Biri 2015, Figs. 6 to 9
+#   caching      bdpt, ic-bdpt, skeleton        Noel and Biri 2015, Figs. 6 to 9; also as published
 #   paths        M = 50 ... 800                 (weights), Figs. 6, 7; (two stages), Figs. 8, 9
 #   samples      N = 1, 2, 4                    (weights), Fig. 9
 #   neighbours   N_c = 0, 1, 3                  (weights), section 6.1.5
@@ -46,7 +46,11 @@ add() {
 for figure in ${FIGURES:-}; do
     case $figure in
     methods) add bdpt:skip=never pcbpt ris two-stage ;;
-    caching) add bdpt:skip=never ic-bdpt skeleton ;;
+    caching)
+        add bdpt:skip=never ic-bdpt skeleton
+        published=draws=apart,weights=balance,samples=1,rr_depth=2,keep=100,skip=never
+        add "ic-bdpt:$published" "skeleton:$published,acceptance=100"
+        ;;
     paths) for m in 50 100 200 400 800; do add "ris:paths=$m" "two-stage:second_stage=$m"; done ;;
     samples) for n in 1 2 4; do add "ris:samples=$n" "two-stage:samples=$n"; done ;;
     neighbours) for n in 0 1 3; do add "ris:neighbours=$n" "two-stage:neighbours=$n"; done ;;

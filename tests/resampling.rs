@@ -16,7 +16,7 @@ const SPP: u64 = 32;
 #[test]
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
-    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 31] = [
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 34] = [
         (ris, &[("paths", "1")]),
         (ris, &[("paths", "2"), ("neighbours", "1")]),
         (ris, &[("paths", "200"), ("neighbours", "0")]),
@@ -44,10 +44,13 @@ fn parameters_do_not_change_the_expectation() {
         (&bdpt::SPEC, &[("light_paths", "1/16"), ("connections", "1/16"), ("heuristic", "power")]),
         (&bdpt::SPEC, &[("light_paths", "1/16"), ("skip", "never")]),
         (&importance::SKELETON, &[("acceptance", "0"), ("cells", "30")]),
-        (&importance::SKELETON, &[("paths", "7"), ("skip", "never")]),
-        (&importance::IC_BDPT, &[("paths", "7"), ("neighbours", "1")]),
-        (&importance::SKELETON, &[("weights", "aware"), ("acceptance", "0"), ("cells", "30")]),
-        (&importance::IC_BDPT, &[("weights", "aware"), ("skip", "never")]),
+        (&importance::SKELETON, &[("paths", "7"), ("weights", "balance"), ("samples", "3")]),
+        (&importance::SKELETON, &[("draws", "apart"), ("weights", "balance"), ("samples", "1"), ("skip", "never")]),
+        (&importance::SKELETON, &[("draws", "apart"), ("acceptance", "0"), ("cells", "30")]),
+        (&importance::IC_BDPT, &[("paths", "50"), ("neighbours", "1")]),
+        (&importance::IC_BDPT, &[("neighbours", "0"), ("samples", "2")]),
+        (&importance::IC_BDPT, &[("draws", "apart"), ("weights", "balance"), ("paths", "7"), ("neighbours", "2")]),
+        (&importance::IC_BDPT, &[("draws", "apart"), ("skip", "never")]),
     ];
     // Diffuse and glossy; lit from everywhere; by lights that have no size.
     let shown = ["room", "environment", "delta-lights", "principled"];
@@ -75,9 +78,12 @@ fn parameters_do_not_change_the_expectation() {
 fn variance_falls_with_the_number_of_iterations_and_the_mean_stays() {
     let scene = prepare(exhibit("room"), Backend::default_available(), None);
     let reference = Picture::render(&path::SPEC, &scene, &[], 512, 700);
-    for spec in [&resampling::PCBPT, &resampling::RIS, &resampling::TWO_STAGE] {
+    for spec in
+        [&resampling::PCBPT, &resampling::RIS, &resampling::TWO_STAGE, &importance::SKELETON, &importance::IC_BDPT]
+    {
         let after = |iterations: u64| {
-            Picture::render(spec, &scene, &[("caches", "20000"), ("second_stage", "16")], iterations, 740 + iterations)
+            let params = [("caches", "20000"), ("second_stage", "16"), ("records", "20000")];
+            Picture::render(spec, &scene, &params, iterations, 740 + iterations)
         };
         let counts = [5, 20, 80];
         let pictures = counts.map(after);

@@ -81,6 +81,7 @@ fn each_technique_alone_makes_the_same_picture() {
         (&resampling::TWO_STAGE, two),
         (&resampling::TWO_STAGE, asked),
         (&importance::IC_BDPT, &[("paths", "100"), ("records", "50000")]),
+        (&importance::IC_BDPT, &[("paths", "100"), ("records", "50000"), ("draws", "apart"), ("samples", "1")]),
     ] {
         techniques_agree(spec, params);
     }

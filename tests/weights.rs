@@ -107,14 +107,15 @@ fn resampling_aware_weights_are_those_of_the_definition() {
             ];
             let two_stage = [&params[..], &[("second_stage", ["16", "1", "200"][i % 3])]].concat();
             let one = found(&resampling::RIS, &scene, &params, 2);
-            let by_length = [
-                ("weights", "aware"),
+            let drawn = [
+                ("draws", ["apart", "together"][(i + i / 2) % 2]),
+                ("samples", ["1", "4"][i % 2]),
                 ("techniques", techniques),
                 ("rr_depth", roulette),
                 ("paths", ["1024", "20", "1"][i % 3]),
             ];
-            let skeleton = [&by_length[..], &[("acceptance", "0"), ("cells", "30")]].concat();
-            let records = [&by_length[..], &[("records", "20000")]].concat();
+            let skeleton = [&drawn[..], &[("acceptance", "0"), ("cells", "30")]].concat();
+            let records = [&drawn[..], &[("records", "20000")]].concat();
             let all = [
                 one,
                 found(&resampling::TWO_STAGE, &scene, &two_stage, 2),

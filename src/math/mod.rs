@@ -6,6 +6,7 @@ pub mod erf;
 pub mod float;
 pub mod frame;
 pub mod fresnel;
+pub mod guided;
 pub mod hash;
 pub mod measure;
 pub mod piecewise;

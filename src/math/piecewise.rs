@@ -2,6 +2,7 @@
 //! sampling, density and inverse. Unlike piecewise constant ones they are positive wherever an interpolated picture is.
 
 use super::float::ONE_MINUS_EPSILON;
+use super::guided::GuidedRows;
 use std::ops::Range;
 
 /// The s in [0, 1] below which the fraction `r` of the mass under a linear density from `a` to `b` lies.
@@ -125,75 +126,6 @@ fn find_cell(cells: Range<usize>, target: f64, cdf: impl Fn(usize) -> f64) -> us
         low -= 1;
     }
     low
-}
-
-/// Rows of cumulative sums over the same number of cells. A guide says for equal parts of the unit interval where to begin, so that a
-/// search touches one cache line of the guide and, mostly, one of the sums.
-///
-/// Sums are single precision: their rounding moves the border between two cells by at most as much as the spacing of the numbers
-/// that choose.
-#[derive(Clone, Debug)]
-struct GuidedRows {
-    cells: usize,
-    /// Parts per row; a power of two, so that multiplying by it is exact.
-    parts: usize,
-    /// Per row, mass below each cell, from 0 to 1.
-    cdf: Vec<f32>,
-    /// Per row, the last cell that begins at or below the start of each part.
-    guide: Vec<u32>,
-}
-
-/// Cells per part of the guide.
-const CELLS_PER_PART: usize = 4;
-
-impl GuidedRows {
-    fn new(cells: usize, rows: usize) -> GuidedRows {
-        let parts = (cells / CELLS_PER_PART).next_power_of_two();
-        let (cdf, guide) = (Vec::with_capacity(rows * (cells + 1)), Vec::with_capacity(rows * (parts + 1)));
-        GuidedRows { cells, parts, cdf, guide }
-    }
-
-    /// Appends a row and returns its mass. A row without mass, which is never asked for, is even.
-    fn push(&mut self, mass: impl Fn(usize) -> f64) -> f64 {
-        let total: f64 = (0..self.cells).map(&mass).sum();
-        let start = self.cdf.len();
-        let mut sum = 0.0;
-        for i in 0..self.cells {
-            self.cdf.push(if total > 0.0 { sum / total } else { i as f64 / self.cells as f64 } as f32);
-            sum += mass(i);
-        }
-        self.cdf.push(1.0);
-        let row = &self.cdf[start..];
-        let mut i = 0;
-        for k in 0..=self.parts {
-            let at = k as f32 / self.parts as f32;
-            while i + 1 < self.cells && row[i + 1] <= at {
-                i += 1;
-            }
-            self.guide.push(i as u32);
-        }
-        total
-    }
-
-    /// The cell of `row` that holds `u` in [0, 1), and how far inside. A cell without mass holds nothing.
-    #[inline]
-    fn find(&self, row: usize, u: f32) -> (usize, f32) {
-        let guide = &self.guide[row * (self.parts + 1)..][..self.parts + 1];
-        let cdf = &self.cdf[row * (self.cells + 1)..][..self.cells + 1];
-        let part = ((u * self.parts as f32) as usize).min(self.parts - 1);
-        let (mut low, mut high) = (guide[part] as usize, guide[part + 1] as usize + 1);
-        while high - low > 1 {
-            let mid = (low + high) / 2;
-            if cdf[mid] <= u { low = mid } else { high = mid }
-        }
-        (low, (u - cdf[low]) / (cdf[low + 1] - cdf[low]))
-    }
-
-    /// What [`GuidedRows::find`] maps to a place `inside` a cell.
-    fn invert(&self, row: usize, cell: usize, inside: f32) -> f32 {
-        let k = row * (self.cells + 1) + cell;
-        self.cdf[k] + inside * (self.cdf[k + 1] - self.cdf[k])
-    }
 }
 
 /// Choice of a cell of a regular grid over the unit square: first its row, then its place in the row. Every cell gets a rectangle

@@ -414,7 +414,9 @@ impl WalkHooks for EyeHooks<'_, '_> {
                 }
                 Some(resampler) => {
                     let (place, effort) = ((vertex.point, vertex.wo), this.effort.connections);
-                    resampler.draw_all(place, sampler.rng(), effort, possible, |candidate| {
+                    // Next event leaves the last of its numbers.
+                    let [.., offset] = sampler.vertex(vertex.index, Purpose::Emitter);
+                    resampler.draw_all(place, (offset, sampler.rng()), effort, possible, |candidate| {
                         self.connect(vertex, &candidate, tracer);
                     });
                 }

@@ -1,14 +1,20 @@
 //! Importance caching: probabilities of light vertices are kept at few places, as a combination of cautious and daring ones
-//! (`resampling::combined`), with the weights of bidirectional path tracing.
+//! (`resampling::combined`).
 //!
 //! * `skeleton` (SkelBPT, Noël and Biri 2015): at nodes in the middle of empty space. Every eye vertex belongs to a node, whose look-up costs
-//!   nothing, and connects to one light sub-path of each length.
+//!   nothing.
 //! * `ic-bdpt` (ICBPT, ibid. §5): at records on surfaces, the three nearest of which an eye vertex mixes.
 //! * `importance-caching` (Georgiev et al. 2012): many-light rendering. What the camera sees is connected to virtual lights, the vertices
 //!   of all light sub-paths; there are no other ways to make a path, so the 1/d² of near ones shows.
+//!
+//! As published, the first two connect an eye vertex to one light sub-path of each length, with the weights of bidirectional path tracing.
+//! These do not know how much more likely than others the sub-paths are drawn that matter, so that other techniques keep most of the
+//! light, and noise. By default eye vertices draw from all lengths together, and weights know of it as those of `ris` do: from means of
+//! earlier iterations at the same places (`mis::resampled`). They are wrong about what a place sees and its site does not, and
+//! cost no rays.
 
-use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH, TECHNIQUES, sizing};
-use super::resampling::{self, Scheme, Settings, Weights};
+use super::bdpt::{self, Bidirectional, HIDE_EMITTERS, MAX_DEPTH, TECHNIQUES, sizing};
+use super::resampling::{self, Draws, KEEP, RR_DEPTH, Scheme, Settings, Weights};
 use super::{Integrator, IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::{Form, Heuristic, Techniques};
 use crate::prepared::Features;
@@ -19,13 +25,13 @@ const PATHS: ParamSpec = ParamSpec {
     default: ParamDefault::Int(1024, 1, 10_000_000),
     ..resampling::PATHS
 };
-const SAMPLES: ParamSpec =
-    ParamSpec { about: "draws of each eye vertex, for each length of light sub-paths", ..resampling::SAMPLES };
-const MANY_SAMPLES: ParamSpec = ParamSpec {
-    about: "virtual lights that each camera ray's point is connected to",
+const SAMPLES: ParamSpec = ParamSpec {
+    about: "draws of each eye vertex; with draws=apart, for each length of light sub-paths",
     default: ParamDefault::Int(4, 1, 1024),
-    ..SAMPLES
+    ..resampling::SAMPLES
 };
+const MANY_SAMPLES: ParamSpec =
+    ParamSpec { about: "virtual lights that each camera ray's point is connected to", ..SAMPLES };
 const RECORDS: ParamSpec = ParamSpec {
     name: "records",
     about: "eye sub-paths that make importance records, per 100 000 pixels",
@@ -41,34 +47,25 @@ const CELLS: ParamSpec = ParamSpec {
 const ACCEPTANCE: ParamSpec = ParamSpec {
     name: "acceptance",
     about: "nodes with at most so many percent of the mean number of eye vertices are left out; there, draws are uniform",
-    default: ParamDefault::Int(100, 0, 10_000),
+    default: ParamDefault::Int(20, 0, 10_000),
+};
+const DRAWS: ParamSpec = ParamSpec {
+    name: "draws",
+    about: "together: from light sub-paths of all lengths, by a mixture of what is seen, of what would be if nothing were in the way, and of all alike; apart: from those of each length, by whichever of these gives a vertex most, as published",
+    default: ParamDefault::Choice("together", &["together", "apart"]),
 };
 const WEIGHTS: ParamSpec = ParamSpec {
     name: "weights",
-    about: "what weights know: balance: nothing of how sub-paths are drawn, as published; aware: what the places around would draw",
-    default: ParamDefault::Choice("balance", &["balance", "aware"]),
+    about: "what weights know: balance: nothing of how sub-paths are drawn, as published; aware: what the places around would draw, by what they have found so far (with draws=apart they are asked by shadow rays)",
+    default: ParamDefault::Choice("aware", &["balance", "aware"]),
 };
 /// Smallest ratio p/q that weights use, as in `ris`.
 const EPSILON: f32 = 1e-3;
+/// Share of light of which weights assume that a site does not know it.
+const DOUBT: f32 = 0.01;
 const SKIP: ParamSpec = sizing::parameter("auto");
 
-fn build(params: &Params, settings: Settings, techniques: Techniques, size: bool) -> Box<dyn Integrator> {
-    let mut this = Bidirectional::new(params, Heuristic::Balance, techniques);
-    this.resample(settings);
-    if size {
-        this.size_by_scene();
-    }
-    Box::new(this)
-}
-
-/// The same with the weights that `params` ask for.
-fn aware(params: &Params, settings: Settings) -> Settings {
-    match params.choice("weights") {
-        "aware" => Settings { weights: Weights::OneStage, form: Form::Asked, epsilon: EPSILON, ..settings },
-        _ => settings,
-    }
-}
-
+/// What all have in common; for methods with several techniques, `params` say how they draw and weigh.
 fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> Settings {
     Settings {
         scheme,
@@ -77,8 +74,8 @@ fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> S
         samples: params.int("samples") as u32,
         neighbours: neighbours as usize,
         cache_fraction: records as f64 * 1e-5,
-        epsilon: 1.0,
-        doubt: 0.0,
+        epsilon: EPSILON,
+        doubt: DOUBT,
         trust: false,
         metric: Metric::Facing,
         radiance: false,
@@ -87,24 +84,55 @@ fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> S
     }
 }
 
+fn draws(params: &Params) -> Draws {
+    if params.choice("draws") == "apart" { Draws::Lengths } else { Draws::Mixture }
+}
+
+fn bidirectional(params: &Params, settings: Settings) -> Box<dyn Integrator> {
+    let settings = match params.choice("weights") {
+        "aware" => Settings {
+            weights: Weights::OneStage,
+            form: if draws(params) == Draws::Lengths { Form::Asked } else { Form::Mixture },
+            ..settings
+        },
+        _ => settings,
+    };
+    let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
+    this.weigher.eye_limits.keep = params.int("keep") as f32 * 0.01;
+    this.resample(settings);
+    if params.choice("skip") == "auto" {
+        this.size_by_scene();
+    }
+    Box::new(this)
+}
+
 /// The registry's line of `skeleton`.
 pub static SKELETON: IntegratorSpec = IntegratorSpec {
     name: "skeleton",
     aliases: &["skelbpt"],
-    about: "Skeleton based connections (SkelBPT): eye vertices draw light sub-paths of each length by what is seen from the middle of the room they are in",
-    params: &[MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, CELLS, ACCEPTANCE, WEIGHTS, SKIP],
+    about: "Skeleton based connections (SkelBPT): eye vertices draw light sub-paths by what is seen from the middle of the room they are in",
+    params: &[
+        MAX_DEPTH,
+        RR_DEPTH,
+        KEEP,
+        HIDE_EMITTERS,
+        TECHNIQUES,
+        PATHS,
+        SAMPLES,
+        CELLS,
+        ACCEPTANCE,
+        DRAWS,
+        WEIGHTS,
+        SKIP,
+    ],
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
     build: |params| {
         let cells = usize::try_from(params.int("cells")).ok().filter(|&n| n > 0);
-        let scheme = Scheme::Skeleton { cells, acceptance: params.int("acceptance") as f64 * 0.01 };
-        build(
-            params,
-            aware(params, settings(params, scheme, 0, 1)),
-            params.techniques("techniques"),
-            params.choice("skip") == "auto",
-        )
+        let acceptance = params.int("acceptance") as f64 * 0.01;
+        let scheme = Scheme::Skeleton { draws: draws(params), cells, acceptance };
+        bidirectional(params, settings(params, scheme, 0, 1))
     },
 };
 
@@ -112,15 +140,27 @@ pub static SKELETON: IntegratorSpec = IntegratorSpec {
 pub static IC_BDPT: IntegratorSpec = IntegratorSpec {
     name: "ic-bdpt",
     aliases: &["icbpt"],
-    about: "Bidirectional path tracing with importance caching (ICBPT): eye vertices draw light sub-paths of each length by probabilities kept at records on surfaces",
-    params: &[MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, TECHNIQUES, PATHS, SAMPLES, RECORDS, NEIGHBOURS, WEIGHTS, SKIP],
+    about: "Bidirectional path tracing with importance caching (ICBPT): eye vertices draw light sub-paths by probabilities kept at records on surfaces",
+    params: &[
+        MAX_DEPTH,
+        RR_DEPTH,
+        KEEP,
+        HIDE_EMITTERS,
+        TECHNIQUES,
+        PATHS,
+        SAMPLES,
+        RECORDS,
+        NEIGHBOURS,
+        DRAWS,
+        WEIGHTS,
+        SKIP,
+    ],
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
     build: |params| {
-        let scheme = Scheme::Records { pooled: false };
-        let settings = settings(params, scheme, params.int("records"), params.int("neighbours"));
-        build(params, aware(params, settings), params.techniques("techniques"), params.choice("skip") == "auto")
+        let scheme = Scheme::Records(draws(params));
+        bidirectional(params, settings(params, scheme, params.int("records"), params.int("neighbours")))
     },
 };
 
@@ -129,7 +169,7 @@ pub static IMPORTANCE_CACHING: IntegratorSpec = IntegratorSpec {
     name: "importance-caching",
     aliases: &[],
     about: "Many lights with importance caching: what the camera sees is lit by virtual lights, drawn by probabilities kept at records on surfaces",
-    params: &[MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS, PATHS, MANY_SAMPLES, RECORDS, NEIGHBOURS],
+    params: &[MAX_DEPTH, bdpt::RR_DEPTH, HIDE_EMITTERS, PATHS, MANY_SAMPLES, RECORDS, NEIGHBOURS],
     unbiased: true,
     refuses: |_| None,
     cannot: |features| {
@@ -140,8 +180,9 @@ pub static IMPORTANCE_CACHING: IntegratorSpec = IntegratorSpec {
     build: |params| {
         let mut techniques = Techniques::none();
         techniques.switch(0..usize::MAX, 2..3, true);
-        let settings =
-            settings(params, Scheme::Records { pooled: true }, params.int("records"), params.int("neighbours"));
-        build(params, settings, techniques, false)
+        let scheme = Scheme::Records(Draws::Many);
+        let mut this = Bidirectional::new(params, Heuristic::Balance, techniques);
+        this.resample(settings(params, scheme, params.int("records"), params.int("neighbours")));
+        Box::new(this)
     },
 };

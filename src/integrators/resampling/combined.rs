@@ -1,29 +1,29 @@
-//! Probabilities of importance caching: several distributions of light vertices at a site, combined into one.
+//! Probabilities of importance caching: several distributions of light vertices at a site, combined into one (`distributions`).
 //!
-//! * *Seen*: in proportion to what a vertex brings to the site, visibility included (V of Noël and Biri 2015, eq. 6; F of Georgiev
-//!   et al. 2012);
-//! * *open*: the same, as if nothing were in the way (U, eq. 7);
-//! * *bounded*: in proportion to f_y/p alone, without a geometry term that may be huge (B; records only);
-//! * *uniform* (C, eq. 8).
-//!
-//! One of them is chosen with equal probability, and the max heuristic says which may produce which vertex: the one that gives it
-//! the largest probability. Since they share no vertex then, all of them together are one distribution: each vertex has the probability of its
-//! winner, normalised over what that wins, over the number of distributions that win anything (§4.3, premultiplied).
-//!
-//! At nodes a vertex brings L/d² (eq. 5), at records f_y ρ G. Light vertices are told apart by the length of their sub-paths, so that an
-//! eye vertex connects to one of each; many lights are one class.
+//! As published, light vertices are told apart by the length of their sub-paths, so that an eye vertex connects to one of each length, and at
+//! nodes a vertex brings L/d² (Noël and Biri 2015, eq. 5); many lights are one class. Where all are drawn from together, few draws
+//! go to what is long and dim; and what a vertex brings to a node is f_y ρ/d², the light that it sends there. At records it always is f_y ρ G.
 
+use super::distributions::{Sums, by_max, by_mixture};
 use super::sites::Sites;
 use super::store::LightStore;
+use crate::math::guided::GuidedRows;
 use crate::prepared::PreparedScene;
 use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
-use crate::spatial::nearest::MOST;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Distributions that are combined.
-const DISTRIBUTIONS: usize = 4;
+/// Among which vertices one is drawn, and by what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::integrators) enum Draws {
+    /// Those of each length by themselves, by the max heuristic.
+    Lengths,
+    /// All, by the max heuristic.
+    Many,
+    /// All, by a mixture.
+    Mixture,
+}
 
 /// Light vertices among which one is drawn.
 #[derive(Clone, Debug)]
@@ -55,10 +55,10 @@ pub(super) struct CombinedPmfs {
 /// A group of sites.
 #[derive(Debug, Default)]
 struct Group {
-    /// For each site and vertex the probability of the vertices of its class up to it.
-    cdf: Vec<f32>,
+    /// For each class, probabilities of its vertices at each site.
+    rows: Vec<GuidedRows>,
     /// For each site and class the sums of what seen, open and bounded go by.
-    sums: Vec<[f64; DISTRIBUTIONS - 1]>,
+    sums: Vec<Sums>,
 }
 
 /// What vertices bring to the sites of a group: for each site one after the other.
@@ -69,62 +69,29 @@ struct Brought {
     bounded: Vec<f32>,
 }
 
-/// Combines distributions over one class, each given up to a factor, into cumulative probabilities; returns their sums.
-fn combine(weights: [&[f32]; DISTRIBUTIONS - 1], cdf: &mut [f32]) -> [f64; DISTRIBUTIONS - 1] {
-    let n = cdf.len();
-    let sums = weights.map(|w| w.iter().map(|v| f64::from(*v)).sum::<f64>());
-    let scales = sums.map(|sum| if sum > 0.0 && sum.is_finite() { 1.0 / sum } else { 0.0 });
-    let uniform = 1.0 / n as f64;
-    let winner = |i: usize| {
-        let mut best = (DISTRIBUTIONS - 1, uniform);
-        for (d, w) in weights.iter().enumerate() {
-            let p = f64::from(w[i]) * scales[d];
-            if p > best.1 {
-                best = (d, p);
-            }
-        }
-        best
-    };
-    let mut won = [0.0; DISTRIBUTIONS];
-    for i in 0..n {
-        let (d, p) = winner(i);
-        won[d] += p;
-    }
-    let winners = won.iter().filter(|&&w| w > 0.0).count() as f64;
-    let mut sum = 0.0;
-    for (i, c) in cdf.iter_mut().enumerate() {
-        let (d, p) = winner(i);
-        sum += p / (won[d] * winners);
-        *c = sum as f32;
-    }
-    if let Some(last) = cdf.last_mut() {
-        *last = 1.0;
-    }
-    sums
-}
-
 impl CombinedPmfs {
-    /// Finds the probabilities of the vertices of `store`, one class for each length or, if `pooled`, one of all.
-    pub fn find(&mut self, scene: &PreparedScene, sites: &Sites, store: &LightStore, pooled: bool) -> RayStats {
-        self.classify(store, pooled);
+    /// Finds the probabilities of the vertices of `store`.
+    pub fn find(&mut self, scene: &PreparedScene, sites: &Sites, store: &LightStore, draws: Draws) -> RayStats {
+        self.classify(store, draws);
+        let combine = if draws == Draws::Mixture { by_mixture } else { by_max };
         let groups: Vec<Range<usize>> = sites.groups().collect();
         self.groups.resize_with(groups.len(), Group::default);
         let (classes, vertices) = (&self.classes, &self.vertices);
         self.groups
             .par_iter_mut()
             .zip(&groups)
-            .map_init(Brought::default, |brought, (Group { cdf, sums }, group)| {
+            .map_init(Brought::default, |brought, (Group { rows, sums }, group)| {
                 let mut tracer = Tracer::new(&*scene.query);
-                bring(sites, group, store, vertices, brought, &mut tracer);
-                cdf.clear();
-                cdf.resize(group.len() * vertices.len(), 0.0);
+                bring((sites, group), (store, vertices), draws, brought, &mut tracer);
+                rows.clear();
+                rows.extend(classes.iter().map(|class| GuidedRows::new(class.range.len(), group.len())));
                 sums.clear();
                 for site in 0..group.len() {
-                    for class in classes {
+                    for (class, rows) in classes.iter().zip(&mut *rows) {
                         let at = |offset: &usize| site * vertices.len() + offset;
                         let range = at(&class.range.start)..at(&class.range.end);
                         let weights = [&brought.seen, &brought.open, &brought.bounded].map(|w| &w[range.clone()]);
-                        sums.push(combine(weights, &mut cdf[range]));
+                        sums.push(combine(weights, rows));
                     }
                 }
                 tracer.stats
@@ -135,14 +102,14 @@ impl CombinedPmfs {
             })
     }
 
-    fn classify(&mut self, store: &LightStore, pooled: bool) {
+    fn classify(&mut self, store: &LightStore, draws: Draws) {
         self.vertices.clear();
         self.vertices.extend(0..store.len() as u32);
         self.classes.clear();
         if store.is_empty() {
             return;
         }
-        if pooled {
+        if draws != Draws::Lengths {
             self.classes.push(Class { range: 0..store.len(), s: 0 });
             return;
         }
@@ -157,7 +124,7 @@ impl CombinedPmfs {
     }
 
     /// For each site the classes' lengths, their numbers of vertices, and the sums of what seen, open and bounded go by.
-    pub fn found(&self) -> impl Iterator<Item = impl Iterator<Item = (usize, usize, [f64; DISTRIBUTIONS - 1])>> {
+    pub fn found(&self) -> impl Iterator<Item = impl Iterator<Item = (usize, usize, Sums)>> {
         let classes = self.classes.len();
         let sites = self.groups.iter().flat_map(move |group| group.sums.chunks_exact(classes.max(1)));
         sites.map(|sums| self.classes.iter().zip(sums).map(|(class, sums)| (class.s, class.range.len(), *sums)))
@@ -178,31 +145,28 @@ impl CombinedPmfs {
     /// Draws from a class by the mean of the probabilities at `found`, or uniformly if there are none.
     #[inline]
     pub fn draw(&self, class: usize, found: &[usize], u: [f32; 2]) -> Drawn {
-        let range = &self.classes[class].range;
-        let n = range.len();
-        let mut rows: [&[f32]; MOST] = [&[]; MOST];
-        for (row, site) in rows.iter_mut().zip(found) {
-            let cdf = &self.groups[site / PACKET].cdf;
-            *row = &cdf[site % PACKET * self.vertices.len()..][range.clone()];
-        }
-        let rows = &rows[..found.len().min(MOST)];
-        let chosen = ((u[0] * rows.len() as f32) as usize).min(rows.len().saturating_sub(1));
-        let Some(cdf) = rows.get(chosen) else {
-            let i = ((u[1] * n as f32) as usize).min(n - 1);
-            return Drawn { vertex: self.vertices[range.start + i] as usize, probability: 1.0 / n as f32 };
+        let Range { start, end } = self.classes[class].range;
+        let drawn = |i: usize, probability: f32| Drawn { vertex: self.vertices[start + i] as usize, probability };
+        let chosen = ((u[0] * found.len() as f32) as usize).min(found.len().saturating_sub(1));
+        let row = |site: usize| (&self.groups[site / PACKET].rows[class], site % PACKET);
+        let Some((rows, at)) = found.get(chosen).map(|&site| row(site)) else {
+            let n = end - start;
+            return drawn(((u[1] * n as f32) as usize).min(n - 1), 1.0 / n as f32);
         };
-        let i = cdf.partition_point(|&c| c <= u[1]).min(n - 1);
-        let sum: f32 = rows.iter().map(|cdf| cdf[i] - if i == 0 { 0.0 } else { cdf[i - 1] }).sum();
-        Drawn { vertex: self.vertices[range.start + i] as usize, probability: sum / rows.len() as f32 }
+        let (i, _) = rows.find(at, u[1]);
+        let probabilities = found.iter().map(|&site| {
+            let (rows, at) = row(site);
+            rows.probability(at, i)
+        });
+        drawn(i, probabilities.sum::<f32>() / found.len() as f32)
     }
 }
 
 /// What each vertex brings to each site of a group, by packets of shadow rays from all sites to one vertex.
 fn bring(
-    sites: &Sites,
-    group: &Range<usize>,
-    store: &LightStore,
-    vertices: &[u32],
+    (sites, group): (&Sites, &Range<usize>),
+    (store, vertices): (&LightStore, &[u32]),
+    draws: Draws,
     brought: &mut Brought,
     tracer: &mut Tracer,
 ) {
@@ -222,6 +186,7 @@ fn bring(
                     brought.bounded[site * vertices.len() + v] = y.throughput.luminance();
                     y.brings(&bsdf, at.position(), normals[group.start + site]).scattered
                 }
+                None if draws == Draws::Mixture => y.sends(&bsdf, at.position()),
                 None => y.throughput.luminance() / y.p.distance_squared(at.position()),
             };
             if open > 0.0 && open.is_finite() {
@@ -239,35 +204,6 @@ fn bring(
                 let at = site * vertices.len() + v;
                 brought.seen[at] = brought.open[at];
             }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn probabilities(weights: [&[f32]; 3]) -> Vec<f32> {
-        let mut cdf = vec![0.0; weights[0].len()];
-        combine(weights, &mut cdf);
-        cdf.iter().enumerate().map(|(i, c)| c - if i == 0 { 0.0 } else { cdf[i - 1] }).collect()
-    }
-
-    #[test]
-    fn the_largest_probability_wins() {
-        // Seen: 0.8 0.2 0 0; open: 0.1 0.1 0.7 0.1; uniform: 0.25. The first two are won by seen and uniform, then open and uniform.
-        let p = probabilities([&[8.0, 2.0, 0.0, 0.0], &[1.0, 1.0, 7.0, 1.0], &[0.0; 4]]);
-        for (p, expected) in p.iter().zip([1.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0, 1.0 / 6.0]) {
-            assert!((p - expected).abs() < 1e-6, "{p} {expected}");
-        }
-    }
-
-    #[test]
-    fn everything_can_be_drawn() {
-        for weights in [[[0.0; 5]; 3], [[1e30, 0.0, 1e-30, 1.0, 0.0], [1e-20; 5], [0.0, 0.0, 0.0, 0.0, 1.0]]] {
-            let p = probabilities([&weights[0], &weights[1], &weights[2]]);
-            assert!((p.iter().sum::<f32>() - 1.0).abs() < 1e-6);
-            assert!(p.iter().all(|&p| p >= 0.24 / 5.0), "{p:?}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What sites of importance caching have found so far of the light sub-paths of each length: the means that weights know.
 
 use super::combined::CombinedPmfs;
+use super::distributions::{UNIFORM, mixture};
 use crate::mis::Lengths;
 use crate::mis::lengths::{DISTRIBUTIONS, LENGTHS};
 
@@ -42,6 +43,16 @@ impl Learnt {
         Lengths { means: means.collect(), numbers, epsilon }
     }
 
+    /// Where all light vertices are one class: what light of one unit makes of the probability with which the site's mixture draws its vertex,
+    /// over that of drawing it uniformly and without the uniform share; zero if no light is known of.
+    #[inline]
+    pub fn known(&self, site: usize) -> f64 {
+        // Many lights have no length.
+        let Some([sums, ..]) = self.sums.get(site) else { return 0.0 };
+        let [seen, open] = mixture(*sums);
+        (seen + open) * self.vertices[0] / (1.0 - UNIFORM)
+    }
+
     /// What must be saved to go on later; nothing if nothing was learnt.
     pub fn state(&self) -> Vec<f64> {
         match self.sums.is_empty() {
@@ -61,5 +72,23 @@ impl Learnt {
             *own = *sum;
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_know_the_mixture_that_is_drawn_from() {
+        // Ten vertices, of which one brings 3 in sight: it is drawn with ½ 3/6 + ⅖ 3/12 + ⅒ 1/10.
+        let mut learnt = Learnt { sums: vec![[[0.0; DISTRIBUTIONS]; LENGTHS]], vertices: [0.0; LENGTHS] };
+        assert_eq!(learnt.known(0), 0.0);
+        (learnt.sums[0][0], learnt.vertices[0]) = ([6.0, 12.0, 1.0], 10.0);
+        let drawn = (1.0 - UNIFORM) * learnt.known(0) * 3.0 / 10.0 + UNIFORM / 10.0;
+        assert!((drawn - (0.5 * 3.0 / 6.0 + 0.4 * 3.0 / 12.0 + 0.01)).abs() < 1e-12, "{drawn}");
+        // After twice as many iterations it is the same.
+        (learnt.sums[0][0], learnt.vertices[0]) = ([12.0, 24.0, 2.0], 20.0);
+        assert!(((1.0 - UNIFORM) * learnt.known(0) * 3.0 / 10.0 + UNIFORM / 10.0 - drawn).abs() < 1e-12);
     }
 }

@@ -23,9 +23,10 @@
 
 pub(in crate::integrators) mod caches;
 pub(in crate::integrators) mod near;
-mod pmfs;
 mod combined;
+mod distributions;
 mod learnt;
+mod pmfs;
 mod places;
 mod prepare;
 pub(in crate::integrators) mod resampler;
@@ -37,6 +38,7 @@ use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, TECHNIQUES};
 use super::{IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::{Form, Heuristic};
 use crate::spatial::nearest::Metric;
+pub(in crate::integrators) use combined::Draws;
 pub(in crate::integrators) use resampler::Resampler;
 
 pub(in crate::integrators) const PATHS: ParamSpec = ParamSpec {
@@ -45,8 +47,9 @@ pub(in crate::integrators) const PATHS: ParamSpec = ParamSpec {
     default: ParamDefault::Int(200, 1, 10_000_000),
 };
 /// One of many connections is drawn: they need not be as many.
-const RR_DEPTH: ParamSpec = ParamSpec { default: ParamDefault::Int(1, 1, 1_000_000), ..super::bdpt::RR_DEPTH };
-const KEEP: ParamSpec = ParamSpec {
+pub(in crate::integrators) const RR_DEPTH: ParamSpec =
+    ParamSpec { default: ParamDefault::Int(1, 1, 1_000_000), ..super::bdpt::RR_DEPTH };
+pub(in crate::integrators) const KEEP: ParamSpec = ParamSpec {
     name: "keep",
     about: "percent of an eye sub-path's survival of Russian roulette on matt surfaces, where connections find all light: lower, more of them end early",
     default: ParamDefault::Int(40, 1, 100),
@@ -257,10 +260,11 @@ pub(in crate::integrators) enum Weights {
 pub(in crate::integrators) enum Scheme {
     /// At cache points, of all light vertices together (`pmfs.rs`).
     Caches,
-    /// At importance records, of the light vertices of each length or, if `pooled`, of all together (`combined.rs`).
-    Records { pooled: bool },
-    /// At nodes of the skeleton of empty space, of the light vertices of each length.
+    /// At importance records.
+    Records(Draws),
+    /// At nodes of the skeleton of empty space.
     Skeleton {
+        draws: Draws,
         /// Voxels along the longest side of the scene, if not decided by the scene.
         cells: Option<usize>,
         /// Share of the mean number of eye vertices that a node must have to be used.

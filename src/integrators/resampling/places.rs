@@ -1,10 +1,11 @@
 //! Where it is known what light vertices bring, and what is known there.
 
 use super::caches::Caches;
-use super::combined::CombinedPmfs;
+use super::combined::{CombinedPmfs, Draws};
 use super::learnt::Learnt;
 use super::pmfs::Pmfs;
 use super::sites::Sites;
+use crate::mis::{Targets, There};
 use crate::ray::offset::SegmentEnd;
 
 /// Places of one kind, with the probabilities of an iteration's light vertices there.
@@ -30,6 +31,7 @@ pub(super) struct AtCaches {
 #[derive(Debug)]
 pub(super) struct AtSites {
     pub sites: Sites,
+    pub draws: Draws,
     pub combined: CombinedPmfs,
     /// What sites have found so far, if weights ask them.
     pub learnt: Learnt,
@@ -38,6 +40,16 @@ pub(super) struct AtSites {
 }
 
 impl AtSites {
+    /// What there is at a place whose sites these are, where all light vertices are drawn from together, L of them from a sub-path.
+    #[inline]
+    pub fn there(&self, sites: &[usize], vertices_per_path: f64) -> There {
+        let known = sites.iter().map(|&site| self.learnt.known(site)).sum::<f64>() / sites.len() as f64;
+        // A node is reached by light of all directions, of which a surface takes the cosine.
+        let all = vertices_per_path * self.sites.mean_cosine() / known;
+        let scattered = if all.is_finite() { all as f32 } else { 0.0 };
+        There { all: Targets { scattered, unscattered: 0.0 }, ..There::default() }
+    }
+
     /// Share of light sub-paths with at least s vertices, as far as is known; never zero.
     pub fn share_of_length(&self, s: usize) -> f32 {
         let last = self.lengths.last().copied().unwrap_or(1.0);

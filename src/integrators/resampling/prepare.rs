@@ -1,14 +1,14 @@
 //! What happens between iterations: light sub-paths are traced, probabilities found, normalisations learnt, states restored.
 
 use super::caches::Caches;
-use super::combined::CombinedPmfs;
+use super::combined::{CombinedPmfs, Draws};
 use super::learnt::Learnt;
 use super::places::{AtCaches, AtSites, Places};
 use super::pmfs::Pmfs;
 use super::resampler::Resampler;
 use super::sites::Sites;
 use super::store::LightStore;
-use super::{Scheme, Settings};
+use super::{Scheme, Settings, Weights};
 use crate::integrators::Iteration;
 use crate::integrators::bdpt::{Bidirectional, Piece};
 use crate::ray::{Phases, RayKind, RayStats};
@@ -59,8 +59,9 @@ impl Bidirectional {
                 let (at, paths) = self.place_caches(iteration, &settings, &mut seen, stats);
                 (Places::Caches(Box::new(at)), paths)
             }
-            Scheme::Records { .. } | Scheme::Skeleton { .. } => {
-                (Places::Sites(Box::new(self.place_sites(iteration, &settings, stats))), settings.paths)
+            Scheme::Records(draws) | Scheme::Skeleton { draws, .. } => {
+                let at = self.place_sites(iteration, &settings, draws, &mut seen, stats);
+                (Places::Sites(Box::new(at)), settings.paths)
             }
         };
         if let Some(resampler) = &mut self.resampler {
@@ -106,32 +107,42 @@ impl Bidirectional {
     }
 
     /// Sites of importance caching with what they find before the first iteration, if weights ask them.
-    fn place_sites(&self, iteration: &Iteration, settings: &Settings, stats: &mut RayStats) -> AtSites {
+    fn place_sites(
+        &self,
+        iteration: &Iteration,
+        settings: &Settings,
+        draws: Draws,
+        seen: &mut [u64; 2],
+        stats: &mut RayStats,
+    ) -> AtSites {
         let (scene, limits) = (iteration.scene, &self.weigher.eye_limits);
         let (sites, s) = match settings.scheme {
-            Scheme::Skeleton { cells, acceptance } => Sites::nodes(scene, iteration.seed, cells, acceptance, limits),
+            Scheme::Skeleton { cells, acceptance, .. } => {
+                Sites::nodes(scene, iteration.seed, cells, acceptance, limits)
+            }
             _ => Sites::records(scene, iteration.seed, settings.cache_fraction, limits),
         };
         stats.merge(&s);
         let (mut learnt, mut lengths) = (Learnt::default(), vec![]);
         let first = Iteration { index: 0, ..*iteration };
-        if settings.scheme != (Scheme::Records { pooled: true }) {
+        if draws == Draws::Lengths {
             let (store, s) = LightStore::trace(self, &first, (WARM_UP_PATHS, 1), false);
             stats.merge(&s);
             // A length that was not met is not impossible.
             lengths = store.lengths().iter().map(|&n| (n as f32).max(0.5) / WARM_UP_PATHS as f32).collect();
         }
-        if settings.form.asks() {
+        if settings.weights != Weights::Balance {
             for set in 1..=WARM_UP {
                 let paths = settings.paths.min(WARM_UP_PATHS);
                 let (store, s) = LightStore::trace(self, &first, (paths, set), false);
                 stats.merge(&s);
                 let mut combined = CombinedPmfs::default();
-                stats.merge(&combined.find(scene, &sites, &store, false));
+                stats.merge(&combined.find(scene, &sites, &store, draws));
                 learnt.learn(&combined);
+                *seen = [seen[0] + store.len() as u64, seen[1] + u64::from(store.paths_traced)];
             }
         }
-        AtSites { sites, combined: CombinedPmfs::default(), learnt, lengths }
+        AtSites { sites, draws, combined: CombinedPmfs::default(), learnt, lengths }
     }
 
     /// Gets the candidates of an iteration ready. All its light sub-paths are traced, and what the lens sees of them is brought back:
@@ -156,10 +167,7 @@ impl Bidirectional {
                 let random = (iteration.seed, iteration.index);
                 at.pmfs.find(scene, &at.caches, store, second_stage.map(|m2| m2 as usize), random)
             }
-            Places::Sites(at) => {
-                let pooled = matches!(resampler.settings.scheme, Scheme::Records { pooled: true });
-                at.combined.find(scene, &at.sites, store, pooled)
-            }
+            Places::Sites(at) => at.combined.find(scene, &at.sites, store, at.draws),
         }));
         stats.phases.merge(&phases);
         (stats, pieces)
@@ -191,14 +199,12 @@ impl Bidirectional {
     pub(in crate::integrators) fn learn(&mut self) {
         let Some(resampler) = &mut self.resampler else { return };
         match &mut resampler.places {
-            Places::Caches(at) => {
-                at.caches.learn(at.pmfs.found());
-                resampler.seen[0] += resampler.store.len() as u64;
-                resampler.seen[1] += u64::from(resampler.store.paths_traced);
-            }
-            Places::Sites(at) if resampler.settings.form.asks() => at.learnt.learn(&at.combined),
-            Places::Sites(_) | Places::None => {}
+            Places::Caches(at) => at.caches.learn(at.pmfs.found()),
+            Places::Sites(at) if resampler.settings.weights != Weights::Balance => at.learnt.learn(&at.combined),
+            Places::Sites(_) | Places::None => return,
         }
+        resampler.seen[0] += resampler.store.len() as u64;
+        resampler.seen[1] += u64::from(resampler.store.paths_traced);
     }
 
     /// Goes on from a saved state.

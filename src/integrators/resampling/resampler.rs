@@ -1,5 +1,6 @@
 //! What resampled connections know in an iteration: candidates, how to draw from them, and what weights need.
 
+use super::distributions::UNIFORM;
 use super::near::Near;
 use super::places::{AtCaches, AtSites, Places};
 use super::pmfs::Choice;
@@ -14,6 +15,9 @@ use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 use crate::ray::offset::SegmentEnd;
 use crate::shade::{SurfacePoint, Transport};
+
+/// The fraction of the golden ratio: its multiples fill a circle evenly.
+const GOLDEN: f32 = 0.618_034;
 
 /// The candidates of an iteration and how to draw from them.
 #[derive(Debug)]
@@ -41,11 +45,13 @@ impl Resampler {
     /// What is known of the light at a point, on the side of the direction `d`.
     #[inline]
     pub fn there(&self, point: &SurfacePoint, d: Vec3) -> There {
+        if self.settings.weights == Weights::Balance || self.settings.form.asks() {
+            return There::default();
+        }
         match &self.places {
-            Places::Caches(at) if self.settings.weights != Weights::Balance && !self.settings.form.asks() => {
-                at.caches.there(point.p, side(point, d))
-            }
-            _ => There::default(),
+            Places::None => There::default(),
+            Places::Caches(at) => at.caches.there(point.p, side(point, d)),
+            Places::Sites(at) => at.there(self.near(point, d).caches(), self.vertices_per_path()),
         }
     }
 
@@ -62,9 +68,14 @@ impl Resampler {
         weigher.asked(resampled, *arriving, &self.proposals(&near, (y.point.p, y.point.ng), seen, value), *s)
     }
 
+    /// L, an estimate; 0 if nothing is known yet.
+    fn vertices_per_path(&self) -> f64 {
+        let [vertices, paths] = self.seen;
+        if paths > 0 { vertices as f64 / paths as f64 } else { 0.0 }
+    }
+
     /// What weights know.
     pub(super) fn resampled(&self) -> Option<Resampled> {
-        let [vertices, paths] = self.seen;
         let Settings { second_stage, .. } = self.settings;
         let (paths_counted, second_stage) = match (self.settings.weights, second_stage) {
             (Weights::Balance, _) => return None,
@@ -76,8 +87,11 @@ impl Resampler {
             second_stage: second_stage.map(|m2| m2 as f32),
             epsilon: self.settings.epsilon,
             doubt: self.settings.doubt,
-            uniform: 1.0 / (self.settings.neighbours + 1) as f32,
-            vertices_per_path: if paths > 0 { (vertices as f64 / paths as f64) as f32 } else { 0.0 },
+            uniform: match self.places {
+                Places::Sites(_) => UNIFORM as f32,
+                _ => 1.0 / (self.settings.neighbours + 1) as f32,
+            },
+            vertices_per_path: self.vertices_per_path() as f32,
             form: self.settings.form,
         })
     }
@@ -91,11 +105,14 @@ impl Resampler {
 
     /// Draws candidates for an eye vertex at `point` that looks from the side of `wo`, and hands them to `connect`. Only a share `effort` of
     /// draws is made. `possible` says which numbers of light vertices are wanted.
+    ///
+    /// The draws of a vertex are systematic: all cut cumulative probabilities at the same place of their own part, which `offset` tells.
+    /// Light vertices that are neighbours in these are neighbours in space.
     #[inline]
     pub fn draw_all<'a>(
         &'a self,
         (point, wo): (&SurfacePoint, Vec3),
-        rng: &mut HashRng,
+        (offset, rng): (f32, &mut HashRng),
         effort: f32,
         possible: impl Fn(usize) -> bool,
         mut connect: impl FnMut(Candidate<'a>),
@@ -107,26 +124,33 @@ impl Resampler {
         match &self.places {
             Places::None => {}
             Places::Caches(at) => {
-                for _ in 0..self.settings.samples {
-                    let u = rng.next_4();
-                    if u[2] < effort
-                        && let Some(candidate) = self.draw(at, &near, [u[0], u[1]], effort)
+                for number in 0..self.settings.samples {
+                    let [proposal, present, ..] = rng.next_4();
+                    if present < effort
+                        && let Some(candidate) = self.draw(at, &near, [proposal, self.cut(number, offset)], effort)
                         && possible(candidate.vertex.length())
                     {
                         connect(candidate);
                     }
                 }
             }
-            Places::Sites(at) => self.draw_by_length(at, &near, rng, effort, possible, connect),
+            Places::Sites(at) => self.draw_at_sites(at, &near, (offset, rng), effort, possible, connect),
         }
     }
 
-    /// The same where sub-paths of each length are drawn from by themselves.
-    fn draw_by_length<'a>(
+    /// Where draw `number` of a vertex cuts cumulative probabilities.
+    #[inline]
+    fn cut(&self, number: u32, offset: f32) -> f32 {
+        // Rounding must not make it one.
+        ((number as f32 + offset) / self.settings.samples as f32).min(1.0 - f32::EPSILON)
+    }
+
+    /// The same at sites of importance caching, from each of their classes by itself.
+    fn draw_at_sites<'a>(
         &'a self,
         at: &AtSites,
         near: &Near,
-        rng: &mut HashRng,
+        (offset, rng): (f32, &mut HashRng),
         effort: f32,
         possible: impl Fn(usize) -> bool,
         mut connect: impl FnMut(Candidate<'a>),
@@ -139,12 +163,14 @@ impl Resampler {
             // Long sub-paths are rare and dim: no more of them are connected to than a pixel's own sub-path would have. A sub-path is then
             // as likely to be met as by the pixel's own: in weights, such connections count as one.
             let effort = effort * length.map_or(1.0, |s| at.share_of_length(s));
-            for _ in 0..self.settings.samples {
-                let u = rng.next_4();
-                if u[2] >= effort {
+            // Classes have their own cuts, or what is drawn of them would be alike.
+            let offset = (offset + class as f32 * GOLDEN).fract();
+            for number in 0..self.settings.samples {
+                let [site, present, ..] = rng.next_4();
+                if present >= effort {
                     continue;
                 }
-                let drawn = at.combined.draw(class, near.caches(), [u[0], u[1]]);
+                let drawn = at.combined.draw(class, near.caches(), [site, self.cut(number, offset)]);
                 let number = self.settings.paths as f32 * self.settings.samples as f32;
                 let candidate = self.store.candidate(drawn.vertex, 1.0 / (drawn.probability * number * effort));
                 if possible(candidate.vertex.length()) {

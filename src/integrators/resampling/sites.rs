@@ -107,6 +107,11 @@ impl Sites {
         }
     }
 
+    /// Mean cosine of the light that is counted at a site, as a surface there would take it.
+    pub fn mean_cosine(&self) -> f64 {
+        if self.normals.is_some() { 1.0 } else { 0.5 }
+    }
+
     /// What of the flux at a light vertex at `p`, whose value for a direction is `value`, a site is reached by if nothing is in the way: ρ G at
     /// records, 1/d² at nodes.
     #[inline]
