@@ -16,7 +16,7 @@ const SPP: u64 = 32;
 #[test]
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
-    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 34] = [
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 39] = [
         (ris, &[("paths", "1")]),
         (ris, &[("paths", "2"), ("neighbours", "1")]),
         (ris, &[("paths", "200"), ("neighbours", "0")]),
@@ -47,6 +47,11 @@ fn parameters_do_not_change_the_expectation() {
         (&importance::SKELETON, &[("paths", "7"), ("weights", "balance"), ("samples", "3")]),
         (&importance::SKELETON, &[("draws", "apart"), ("weights", "balance"), ("samples", "1"), ("skip", "never")]),
         (&importance::SKELETON, &[("draws", "apart"), ("acceptance", "0"), ("cells", "30")]),
+        (&importance::SKELETON, &[("distributions", "seen"), ("skip", "never")]),
+        (&importance::SKELETON, &[("distributions", "open"), ("draws", "apart"), ("weights", "balance")]),
+        (&importance::SKELETON, &[("distributions", "uniform")]),
+        (&importance::IC_BDPT, &[("distributions", "seen"), ("draws", "apart"), ("samples", "1")]),
+        (&importance::IC_BDPT, &[("distributions", "open")]),
         (&importance::IC_BDPT, &[("paths", "50"), ("neighbours", "1")]),
         (&importance::IC_BDPT, &[("neighbours", "0"), ("samples", "2")]),
         (&importance::IC_BDPT, &[("draws", "apart"), ("weights", "balance"), ("paths", "7"), ("neighbours", "2")]),

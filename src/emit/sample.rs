@@ -5,6 +5,7 @@
 //! and the next vertex's area density comes from the disk that emission rays start on. The functions of [`LightEnd`] apply
 //! these rules, so that callers write one formula for all lights.
 
+use crate::math::measure::spread;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 use crate::ray::offset::SegmentEnd;
 
@@ -62,7 +63,7 @@ impl LightEnd {
     #[inline]
     pub fn spread(&self, wo: Vec3, dist2: f32) -> f32 {
         match self {
-            LightEnd::Surface { ng, .. } => ng.dot(wo).abs() / dist2,
+            LightEnd::Surface { ng, .. } => spread(ng.dot(wo), dist2),
             LightEnd::Point { .. } | LightEnd::Infinite => 1.0,
         }
     }

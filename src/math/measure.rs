@@ -1,7 +1,7 @@
 //! Densities that carry their measure in the type, so that adding a solid-angle density to an area density does not compile.
 //!
-//! The only conversions are [`SolidAnglePdf::to_area`] and [`AreaPdf::to_solid_angle`] (Veach 1997, eq. 8.8:
-//! p_A(x') = p_σ(ω) |cos θ'| / d²).
+//! The only conversions are [`SolidAnglePdf::to_area`] and [`AreaPdf::to_solid_angle`], and [`spread`] where a factor is kept for many of
+//! them (Veach 1997, eq. 8.8: p_A(x') = p_σ(ω) |cos θ'| / d²).
 
 /// Density per steradian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
@@ -17,6 +17,12 @@ pub struct AreaPdf(pub f32);
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 #[repr(transparent)]
 pub struct Pmf(pub f32);
+
+/// |cos| / distance²: what turns a density per steradian into one per unit area at the far point.
+#[inline]
+pub fn spread(cos: f32, dist2: f32) -> f32 {
+    cos.abs() / dist2
+}
 
 impl SolidAnglePdf {
     /// Density at the surface point a distance √`dist2` away whose normal makes `cos` with the direction.

@@ -18,11 +18,12 @@ pub mod side;
 pub mod techniques;
 pub mod weigh;
 
+pub use crate::math::measure::spread;
 pub use effort::{Contribution, Costs, Effort, EffortStatistics};
 pub use lengths::Lengths;
 pub use proposals::{Proposal, Proposals, Shares};
 pub use resampled::{Form, Resampled, Targets, There};
-pub use side::{Lit, Node, Side, next_event, spread};
+pub use side::{Lit, Node, Side, next_event};
 pub use techniques::{Techniques, TechniquesError};
 pub use weigh::{End, Joint, Split, Weigher, Weight};
 

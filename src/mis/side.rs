@@ -8,6 +8,7 @@
 //! the direction's density at the next vertex (see `emit::sample`). [`Node::spread`] hides the difference.
 
 use super::{Proposals, There};
+use crate::math::measure::spread;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::{Edge, SurfaceVertex};
 use crate::shade::{BsdfSample, Transport};
@@ -60,12 +61,6 @@ impl Node {
     pub fn origin(forward: AreaPdf) -> Node {
         Node::plain(forward, 0.0, 1.0)
     }
-}
-
-/// |cos| / distance²: from a density per steradian to one per unit area at the far point (Veach 1997, eq. 8.8).
-#[inline]
-pub fn spread(cos: f32, dist2: f32) -> f32 {
-    cos.abs() / dist2
 }
 
 /// c_1 of a light with extent: the density per steradian with which next event draws its point from the next vertex, over the area density

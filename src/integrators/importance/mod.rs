@@ -14,7 +14,7 @@
 //! cost no rays.
 
 use super::bdpt::{self, Bidirectional, HIDE_EMITTERS, MAX_DEPTH, TECHNIQUES, sizing};
-use super::resampling::{self, Draws, KEEP, RR_DEPTH, Scheme, Settings, Weights};
+use super::resampling::{self, Distribution, Draws, DrawsFrom, KEEP, RR_DEPTH, Scheme, Settings, Weights};
 use super::{Integrator, IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::{Form, Heuristic, Techniques};
 use crate::prepared::Features;
@@ -54,6 +54,11 @@ const DRAWS: ParamSpec = ParamSpec {
     about: "together: from light sub-paths of all lengths, by a mixture of what is seen, of what would be if nothing were in the way, and of all alike; apart: from those of each length, by whichever of these gives a vertex most, as published",
     default: ParamDefault::Choice("together", &["together", "apart"]),
 };
+const DISTRIBUTIONS: ParamSpec = ParamSpec {
+    name: "distributions",
+    about: "of light sub-paths: all, or besides the uniform one only what is seen, only what would be if nothing were in the way, or nothing",
+    default: ParamDefault::Choice("all", &["all", "seen", "open", "uniform"]),
+};
 const WEIGHTS: ParamSpec = ParamSpec {
     name: "weights",
     about: "what weights know: balance: nothing of how sub-paths are drawn, as published; aware: what the places around would draw, by what they have found so far (with draws=apart they are asked by shadow rays)",
@@ -85,14 +90,22 @@ fn settings(params: &Params, scheme: Scheme, records: i64, neighbours: i64) -> S
 }
 
 fn draws(params: &Params) -> Draws {
-    if params.choice("draws") == "apart" { Draws::Lengths } else { Draws::Mixture }
+    Draws {
+        from: if params.choice("draws") == "apart" { DrawsFrom::Lengths } else { DrawsFrom::Mixture },
+        only: match params.choice("distributions") {
+            "seen" => Some(Distribution::Seen),
+            "open" => Some(Distribution::Open),
+            "uniform" => Some(Distribution::Uniform),
+            _ => None,
+        },
+    }
 }
 
 fn bidirectional(params: &Params, settings: Settings) -> Box<dyn Integrator> {
     let settings = match params.choice("weights") {
         "aware" => Settings {
             weights: Weights::OneStage,
-            form: if draws(params) == Draws::Lengths { Form::Asked } else { Form::Mixture },
+            form: if draws(params).from == DrawsFrom::Lengths { Form::Asked } else { Form::Mixture },
             ..settings
         },
         _ => settings,
@@ -122,6 +135,7 @@ pub static SKELETON: IntegratorSpec = IntegratorSpec {
         CELLS,
         ACCEPTANCE,
         DRAWS,
+        DISTRIBUTIONS,
         WEIGHTS,
         SKIP,
     ],
@@ -152,6 +166,7 @@ pub static IC_BDPT: IntegratorSpec = IntegratorSpec {
         RECORDS,
         NEIGHBOURS,
         DRAWS,
+        DISTRIBUTIONS,
         WEIGHTS,
         SKIP,
     ],
@@ -180,7 +195,7 @@ pub static IMPORTANCE_CACHING: IntegratorSpec = IntegratorSpec {
     build: |params| {
         let mut techniques = Techniques::none();
         techniques.switch(0..usize::MAX, 2..3, true);
-        let scheme = Scheme::Records(Draws::Many);
+        let scheme = Scheme::Records(Draws { from: DrawsFrom::Many, only: None });
         let mut this = Bidirectional::new(params, Heuristic::Balance, techniques);
         this.resample(settings(params, scheme, params.int("records"), params.int("neighbours")));
         Box::new(this)

@@ -4,7 +4,7 @@
 //! nodes a vertex brings L/d² (Noël and Biri 2015, eq. 5); many lights are one class. Where all are drawn from together, few draws
 //! go to what is long and dim; and what a vertex brings to a node is f_y ρ/d², the light that it sends there. At records it always is f_y ρ G.
 
-use super::distributions::{Sums, by_max, by_mixture};
+use super::distributions::{Distribution, Sums, by_max, by_mixture};
 use super::sites::Sites;
 use super::store::LightStore;
 use crate::math::guided::GuidedRows;
@@ -14,9 +14,17 @@ use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Among which vertices one is drawn, and by what.
+/// How eye vertices draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::integrators) enum Draws {
+pub(in crate::integrators) struct Draws {
+    pub from: DrawsFrom,
+    /// The only distribution that is combined with the uniform one, if others are off.
+    pub only: Option<Distribution>,
+}
+
+/// Among which vertices one is drawn, and how distributions are combined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::integrators) enum DrawsFrom {
     /// Those of each length by themselves, by the max heuristic.
     Lengths,
     /// All, by the max heuristic.
@@ -73,7 +81,7 @@ impl CombinedPmfs {
     /// Finds the probabilities of the vertices of `store`.
     pub fn find(&mut self, scene: &PreparedScene, sites: &Sites, store: &LightStore, draws: Draws) -> RayStats {
         self.classify(store, draws);
-        let combine = if draws == Draws::Mixture { by_mixture } else { by_max };
+        let combine = if draws.from == DrawsFrom::Mixture { by_mixture } else { by_max };
         let groups: Vec<Range<usize>> = sites.groups().collect();
         self.groups.resize_with(groups.len(), Group::default);
         let (classes, vertices) = (&self.classes, &self.vertices);
@@ -109,7 +117,7 @@ impl CombinedPmfs {
         if store.is_empty() {
             return;
         }
-        if draws != Draws::Lengths {
+        if draws.from != DrawsFrom::Lengths {
             self.classes.push(Class { range: 0..store.len(), s: 0 });
             return;
         }
@@ -186,7 +194,7 @@ fn bring(
                     brought.bounded[site * vertices.len() + v] = y.throughput.luminance();
                     y.brings(&bsdf, at.position(), normals[group.start + site]).scattered
                 }
-                None if draws == Draws::Mixture => y.sends(&bsdf, at.position()),
+                None if draws.from == DrawsFrom::Mixture => y.sends(&bsdf, at.position()),
                 None => y.throughput.luminance() / y.p.distance_squared(at.position()),
             };
             if open > 0.0 && open.is_finite() {
@@ -205,5 +213,10 @@ fn bring(
                 brought.seen[at] = brought.open[at];
             }
         }
+    }
+    if let Some(only) = draws.only {
+        let off = [(Distribution::Seen, &mut brought.seen), (Distribution::Open, &mut brought.open)];
+        off.into_iter().filter(|(d, _)| *d != only).for_each(|(_, list)| list.fill(0.0));
+        brought.bounded.fill(0.0);
     }
 }

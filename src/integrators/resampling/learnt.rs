@@ -81,12 +81,12 @@ mod tests {
 
     #[test]
     fn weights_know_the_mixture_that_is_drawn_from() {
-        // Ten vertices, of which one brings 3 in sight: it is drawn with ½ 3/6 + ⅖ 3/12 + ⅒ 1/10.
+        // Ten vertices, of which one brings 3 in sight: it is drawn with ⅖ 3/6 + ⅖ 3/12 + ⅕ 1/10.
         let mut learnt = Learnt { sums: vec![[[0.0; DISTRIBUTIONS]; LENGTHS]], vertices: [0.0; LENGTHS] };
         assert_eq!(learnt.known(0), 0.0);
         (learnt.sums[0][0], learnt.vertices[0]) = ([6.0, 12.0, 1.0], 10.0);
         let drawn = (1.0 - UNIFORM) * learnt.known(0) * 3.0 / 10.0 + UNIFORM / 10.0;
-        assert!((drawn - (0.5 * 3.0 / 6.0 + 0.4 * 3.0 / 12.0 + 0.01)).abs() < 1e-12, "{drawn}");
+        assert!((drawn - (0.4 * 3.0 / 6.0 + 0.4 * 3.0 / 12.0 + 0.02)).abs() < 1e-12, "{drawn}");
         // After twice as many iterations it is the same.
         (learnt.sums[0][0], learnt.vertices[0]) = ([12.0, 24.0, 2.0], 20.0);
         assert!(((1.0 - UNIFORM) * learnt.known(0) * 3.0 / 10.0 + UNIFORM / 10.0 - drawn).abs() < 1e-12);

@@ -38,7 +38,8 @@ use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, TECHNIQUES};
 use super::{IntegratorSpec, ParamDefault, ParamSpec, Params};
 use crate::mis::{Form, Heuristic};
 use crate::spatial::nearest::Metric;
-pub(in crate::integrators) use combined::Draws;
+pub(in crate::integrators) use combined::{Draws, DrawsFrom};
+pub(in crate::integrators) use distributions::Distribution;
 pub(in crate::integrators) use resampler::Resampler;
 
 pub(in crate::integrators) const PATHS: ParamSpec = ParamSpec {

@@ -1,7 +1,7 @@
 //! What happens between iterations: light sub-paths are traced, probabilities found, normalisations learnt, states restored.
 
 use super::caches::Caches;
-use super::combined::{CombinedPmfs, Draws};
+use super::combined::{CombinedPmfs, Draws, DrawsFrom};
 use super::learnt::Learnt;
 use super::places::{AtCaches, AtSites, Places};
 use super::pmfs::Pmfs;
@@ -125,7 +125,7 @@ impl Bidirectional {
         stats.merge(&s);
         let (mut learnt, mut lengths) = (Learnt::default(), vec![]);
         let first = Iteration { index: 0, ..*iteration };
-        if draws == Draws::Lengths {
+        if draws.from == DrawsFrom::Lengths {
             let (store, s) = LightStore::trace(self, &first, (WARM_UP_PATHS, 1), false);
             stats.merge(&s);
             // A length that was not met is not impossible.
