@@ -15,7 +15,7 @@ use std::sync::LazyLock;
 /// What four numbers of a vertex are for. Fixed slots keep Sobol dimensions aligned whatever earlier vertices consumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// Choosing a light and a point on it: [light, u, v, spare].
+    /// Choosing a light and a point on it, and where draws of resampled connections begin: [light, u, v, draws].
     Emitter = 0,
     /// Choosing a lobe and a direction, and Russian roulette: [lobe, u, v, roulette].
     Scatter = 1,

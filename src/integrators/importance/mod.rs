@@ -101,30 +101,9 @@ fn draws(params: &Params) -> Draws {
     }
 }
 
-fn bidirectional(params: &Params, settings: Settings) -> Box<dyn Integrator> {
-    let settings = match params.choice("weights") {
-        "aware" => Settings {
-            weights: Weights::OneStage,
-            form: if draws(params).from == DrawsFrom::Lengths { Form::Asked } else { Form::Mixture },
-            ..settings
-        },
-        _ => settings,
-    };
-    let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
-    this.weigher.eye_limits.keep = params.int("keep") as f32 * 0.01;
-    this.resample(settings);
-    if params.choice("skip") == "auto" {
-        this.size_by_scene();
-    }
-    Box::new(this)
-}
-
-/// The registry's line of `skeleton`.
-pub static SKELETON: IntegratorSpec = IntegratorSpec {
-    name: "skeleton",
-    aliases: &["skelbpt"],
-    about: "Skeleton based connections (SkelBPT): eye vertices draw light sub-paths by what is seen from the middle of the room they are in",
-    params: &[
+/// The parameters of methods with several techniques, which differ in their places.
+const fn parameters([first, second]: [ParamSpec; 2]) -> [ParamSpec; 13] {
+    [
         MAX_DEPTH,
         RR_DEPTH,
         KEEP,
@@ -132,21 +111,46 @@ pub static SKELETON: IntegratorSpec = IntegratorSpec {
         TECHNIQUES,
         PATHS,
         SAMPLES,
-        CELLS,
-        ACCEPTANCE,
+        first,
+        second,
         DRAWS,
         DISTRIBUTIONS,
         WEIGHTS,
         SKIP,
-    ],
+    ]
+}
+
+const SKELETON_PARAMS: [ParamSpec; 13] = parameters([CELLS, ACCEPTANCE]);
+const IC_BDPT_PARAMS: [ParamSpec; 13] = parameters([RECORDS, NEIGHBOURS]);
+
+/// Such a method; where it asks by shadow rays, it is of sub-paths of each length.
+fn bidirectional(params: &Params, from: DrawsFrom, settings: Settings) -> Box<dyn Integrator> {
+    let settings = match params.choice("weights") {
+        "aware" => Settings {
+            weights: Weights::OneStage,
+            form: if from == DrawsFrom::Lengths { Form::Asked } else { Form::Mixture },
+            ..settings
+        },
+        _ => settings,
+    };
+    resampling::build_resampled(params, settings)
+}
+
+/// The registry's line of `skeleton`.
+pub static SKELETON: IntegratorSpec = IntegratorSpec {
+    name: "skeleton",
+    aliases: &["skelbpt"],
+    about: "Skeleton based connections (SkelBPT): eye vertices draw light sub-paths by what is seen from the middle of the room they are in",
+    params: &SKELETON_PARAMS,
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
     build: |params| {
         let cells = usize::try_from(params.int("cells")).ok().filter(|&n| n > 0);
         let acceptance = params.int("acceptance") as f64 * 0.01;
-        let scheme = Scheme::Skeleton { draws: draws(params), cells, acceptance };
-        bidirectional(params, settings(params, scheme, 0, 1))
+        let draws = draws(params);
+        let scheme = Scheme::Skeleton { draws, cells, acceptance };
+        bidirectional(params, draws.from, settings(params, scheme, 0, 1))
     },
 };
 
@@ -155,27 +159,14 @@ pub static IC_BDPT: IntegratorSpec = IntegratorSpec {
     name: "ic-bdpt",
     aliases: &["icbpt"],
     about: "Bidirectional path tracing with importance caching (ICBPT): eye vertices draw light sub-paths by probabilities kept at records on surfaces",
-    params: &[
-        MAX_DEPTH,
-        RR_DEPTH,
-        KEEP,
-        HIDE_EMITTERS,
-        TECHNIQUES,
-        PATHS,
-        SAMPLES,
-        RECORDS,
-        NEIGHBOURS,
-        DRAWS,
-        DISTRIBUTIONS,
-        WEIGHTS,
-        SKIP,
-    ],
+    params: &IC_BDPT_PARAMS,
     unbiased: true,
     refuses: |_| None,
     cannot: |_| None,
     build: |params| {
-        let scheme = Scheme::Records(draws(params));
-        bidirectional(params, settings(params, scheme, params.int("records"), params.int("neighbours")))
+        let draws = draws(params);
+        let settings = settings(params, Scheme::Records(draws), params.int("records"), params.int("neighbours"));
+        bidirectional(params, draws.from, settings)
     },
 };
 

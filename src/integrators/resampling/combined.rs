@@ -7,10 +7,12 @@
 use super::distributions::{Distribution, Sums, by_max, by_mixture};
 use super::sites::Sites;
 use super::store::LightStore;
+use crate::math::Vec3;
 use crate::math::guided::GuidedRows;
 use crate::prepared::PreparedScene;
 use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
+use crate::shade::Transport;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -182,41 +184,40 @@ fn bring(
         list.clear();
         list.resize(group.len() * vertices.len(), 0.0);
     }
+    let wants = |distribution| draws.only.is_none_or(|only| only == distribution);
+    let bounded = sites.normals.is_some() && draws.only.is_none() && draws.from != DrawsFrom::Mixture;
     for (v, &number) in vertices.iter().enumerate() {
         let y = store.vertex(number as usize);
         let (bsdf, end) = (store.bsdf(number as usize), y.end());
+        let value = |to: Vec3| bsdf.eval(y.wo, to, Transport::Importance);
         let mut packet = SegmentPacket::default();
-        let mut asked = [0usize; PACKET];
+        let mut asked = [(0, 0.0); PACKET];
         for site in 0..group.len() {
-            let at = &sites.ends[group.start + site];
-            let open = match &sites.normals {
-                Some(normals) => {
-                    brought.bounded[site * vertices.len() + v] = y.throughput.luminance();
-                    y.brings(&bsdf, at.position(), normals[group.start + site]).scattered
-                }
-                None if draws.from == DrawsFrom::Mixture => y.sends(&bsdf, at.position()),
-                None => y.throughput.luminance() / y.p.distance_squared(at.position()),
-            };
-            if open > 0.0 && open.is_finite() {
-                brought.open[site * vertices.len() + v] = open;
-                asked[packet.len] = site;
-                packet.push(&segment(at, &end));
+            let at = site * vertices.len() + v;
+            if bounded {
+                brought.bounded[at] = y.throughput.luminance();
+            }
+            let reached = sites.reached(group.start + site, draws.from, y.p, value);
+            let open = (y.throughput * reached).luminance();
+            if open <= 0.0 || !open.is_finite() {
+                continue;
+            }
+            if wants(Distribution::Open) {
+                brought.open[at] = open;
+            }
+            if wants(Distribution::Seen) {
+                asked[packet.len] = (at, open);
+                packet.push(&segment(&sites.ends[group.start + site], &end));
             }
         }
         if packet.len == 0 {
             continue;
         }
         let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
-        for (i, site) in asked[..packet.len].iter().enumerate() {
+        for (i, &(at, open)) in asked[..packet.len].iter().enumerate() {
             if blocked >> i & 1 == 0 {
-                let at = site * vertices.len() + v;
-                brought.seen[at] = brought.open[at];
+                brought.seen[at] = open;
             }
         }
-    }
-    if let Some(only) = draws.only {
-        let off = [(Distribution::Seen, &mut brought.seen), (Distribution::Open, &mut brought.open)];
-        off.into_iter().filter(|(d, _)| *d != only).for_each(|(_, list)| list.fill(0.0));
-        brought.bounded.fill(0.0);
     }
 }

@@ -196,6 +196,11 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
         form,
         weights,
     };
+    build_resampled(params, settings)
+}
+
+/// An integrator with the parameters that all methods of this kind have.
+pub(in crate::integrators) fn build_resampled(params: &Params, settings: Settings) -> Box<dyn super::Integrator> {
     let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
     this.weigher.eye_limits.keep = params.int("keep") as f32 * 0.01;
     this.resample(settings);

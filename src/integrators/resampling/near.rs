@@ -83,7 +83,8 @@ impl Resampler {
                     }
                 }
                 Places::Sites(at) => {
-                    let open = Some(at.sites.reached(place, p, &value)).filter(|open| open.luminance().is_finite());
+                    let open = Some(at.sites.reached(place, at.draws.from, p, &value))
+                        .filter(|open| open.luminance().is_finite());
                     proposal.site = place as u32;
                     proposal.open = open.unwrap_or(Rgb::BLACK);
                     proposal.scattered = if sees { proposal.open } else { Rgb::BLACK };

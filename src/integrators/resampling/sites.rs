@@ -5,6 +5,7 @@
 //! belongs to are left out, and eye vertices there draw uniformly (§4.4).
 
 use super::caches::place;
+use super::combined::DrawsFrom;
 use super::store::direction_to;
 use crate::math::{Rgb, Vec3};
 use crate::path::Limits;
@@ -113,13 +114,17 @@ impl Sites {
     }
 
     /// What of the flux at a light vertex at `p`, whose value for a direction is `value`, a site is reached by if nothing is in the way: ρ G at
-    /// records, 1/d² at nodes.
+    /// records; at nodes 1/d² and, unless that is to be as published, ρ.
     #[inline]
-    pub fn reached(&self, site: usize, p: Vec3, value: impl Fn(Vec3) -> Rgb) -> Rgb {
+    pub fn reached(&self, site: usize, from: DrawsFrom, p: Vec3, value: impl Fn(Vec3) -> Rgb) -> Rgb {
         let at = self.ends[site].position();
         match &self.normals {
             Some(normals) => direction_to(p, at, normals[site]).map_or(Rgb::BLACK, |(to, spread)| value(to) * spread),
-            None => Rgb::grey(1.0 / p.distance_squared(at)),
+            None => {
+                let to = at - p;
+                let inverse = 1.0 / to.length_squared();
+                if from == DrawsFrom::Mixture { value(to * inverse.sqrt()) * inverse } else { Rgb::grey(inverse) }
+            }
         }
     }
 

@@ -91,16 +91,6 @@ impl LightVertex {
         };
         if targets.scattered.is_finite() && targets.unscattered.is_finite() { targets } else { Targets::default() }
     }
-
-    /// What the sub-path sends to a point in free space, per unit area across, as if nothing were in the way.
-    #[inline]
-    pub fn sends(&self, bsdf: &BsdfRef, p: Vec3) -> f32 {
-        let to = p - self.p;
-        let dist2 = to.length_squared();
-        let value = bsdf.eval(self.wo, to * (1.0 / dist2.sqrt()), Transport::Importance);
-        let sent = (self.throughput * value).luminance() / dist2;
-        if sent.is_finite() { sent } else { 0.0 }
-    }
 }
 
 impl LightStore {
