@@ -8,7 +8,6 @@ use lightsieve::image::ExrFile;
 use lightsieve::image::metrics::pixel_errors;
 use lightsieve::integrators::{Iteration, Params, path};
 use lightsieve::load::{LoadOptions, load_scene};
-use lightsieve::measure::converge::mean;
 use lightsieve::prepared::{PrepareOptions, PreparedScene};
 use lightsieve::ray::Backend;
 use lightsieve::render::{Budget, ErrorTarget, Stop, render, render_to_target};
@@ -59,6 +58,7 @@ fn merged_renders_are_one_render_of_all_samples() {
     for (seed, spp) in [(3, 4), (4, 8), (5, 1)] {
         let mut integrator = (path::SPEC.build)(&path_params());
         for index in 0..spp {
+            film.begin_iteration();
             integrator.iterate(&Iteration { scene: &scene, seed, index }, &mut film);
         }
     }
@@ -123,7 +123,7 @@ fn the_estimated_error_is_the_true_one() {
     let mut reference = Film::new(scene.window);
     let budget = Budget { iterations: Some(2048), time: None };
     render(&scene, &mut *build(), &mut reference, 1000, budget, &never, |_, _, _| {});
-    let reference = mean(&reference);
+    let reference = reference.mean_f64();
     for (key, value) in [("relmse", 5e-3), ("relmse_trimmed", 2e-3), ("mape", 0.04), ("mae", 0.008)] {
         let target = ErrorTarget::parse(&format!("{key}={value}")).unwrap();
         for seed in [1, 2] {
@@ -132,9 +132,9 @@ fn the_estimated_error_is_the_true_one() {
             let (outcome, estimate) =
                 render_to_target(&scene, build, &mut film, (seed, budget, &target), &never, |_, _| {});
             assert_eq!(outcome.stop, Stop::Converged, "{key}");
-            assert!(film.iterations < 4096 && outcome.iterations == film.iterations);
+            assert!(film.iterations() < 4096 && outcome.iterations == film.iterations());
             let estimate = estimate.unwrap();
-            let errors = serde_json::to_value(pixel_errors(&mean(&film), &reference)).unwrap();
+            let errors = serde_json::to_value(pixel_errors(&film.mean_f64(), &reference)).unwrap();
             let truth = number(&errors[key]);
             assert!(estimate < value, "{key}: {estimate}");
             assert!((estimate / truth - 1.0).abs() < 0.2, "{key}: by estimate {estimate}, in truth {truth}");

@@ -5,7 +5,6 @@ use super::measure_args::ProfileArgs;
 use super::stage::{Stage, command_line, to_json, write_text};
 use crate::image::{Layer, Picture, write_picture};
 use crate::math::Rgb;
-use crate::measure::converge::mean;
 use crate::measure::profile::{Profile, Task, profile};
 use crate::measure::report::pictures::doubles;
 use crate::measure::report::{Page, Shown, Table, picture_group};
@@ -45,7 +44,7 @@ pub(crate) fn run(args: &ProfileArgs) -> Result<(), Failure> {
         for (name, pixels) in [("cost.exr", map.cost_picture()), ("blocked.exr", map.blocked_picture())] {
             stage.say(&format!("wrote {}", write_map(folder, name, &map, &pixels)?.display()));
         }
-        let page = page(&found, &tables, &mean(&film), &map);
+        let page = page(&found, &tables, &film.mean_f64(), &map);
         stage.say(&format!("wrote {}", write_text(folder, "index.html", &page)?.display()));
     }
     Ok(())

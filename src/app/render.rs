@@ -87,7 +87,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let mut last_checkpoint = Instant::now();
     let mut trouble = None;
     let mut integrator = (config.spec.build)(&config.params);
-    let next = Iteration { scene: &scene, seed: args.what.seed, index: film.iterations };
+    let next = Iteration { scene: &scene, seed: args.what.seed, index: film.iterations() };
     if !pool.install(|| integrator.restore(&next, &state)) {
         return Err(Failure::Input("the checkpoint does not hold what this integrator has learnt".into()));
     }
@@ -130,7 +130,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         )
     });
     bar.finish_and_clear();
-    if film.iterations == 0 {
+    if film.iterations() == 0 {
         // Interrupted before there was anything: an earlier picture is worth more than a black one.
         return Err(Failure::Interrupted);
     }

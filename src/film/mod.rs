@@ -43,8 +43,7 @@ pub struct Film {
     pub height: u32,
     /// Tiles, row by row.
     pub tiles: Vec<FilmTile>,
-    /// Iterations summed.
-    pub iterations: u64,
+    iterations: u64,
 }
 
 impl Film {
@@ -59,6 +58,23 @@ impl Film {
         Film { x0, y0, width, height, tiles, iterations: 0 }
     }
 
+    /// Begins the next iteration and returns its index, from zero on. From now on it counts as one of [`Film::iterations`]; all its
+    /// samples are added before the next begins.
+    pub fn begin_iteration(&mut self) -> u64 {
+        self.iterations += 1;
+        self.iterations - 1
+    }
+
+    /// Iterations in the film, the running one included: samples per pixel.
+    pub fn iterations(&self) -> u64 {
+        self.iterations
+    }
+
+    /// Sets the number of iterations of a film whose sums are read from a file.
+    pub(crate) fn set_iterations(&mut self, iterations: u64) {
+        self.iterations = iterations;
+    }
+
     /// Calls `f(x, y, sum, sum of squares)` for every pixel; x and y count from the rendered part's corner.
     pub fn for_each_pixel(&self, mut f: impl FnMut(u32, u32, [f64; 3], [f64; 3])) {
         for tile in &self.tiles {
@@ -69,14 +85,17 @@ impl Film {
         }
     }
 
-    /// The picture: mean radiance per pixel, row by row.
-    pub fn mean(&self) -> Vec<Rgb> {
-        let mut out = vec![Rgb::BLACK; self.width as usize * self.height as usize];
+    /// The picture: mean radiance per pixel, row by row, in double precision; black before the first iteration.
+    pub fn mean_f64(&self) -> Vec<[f64; 3]> {
+        let mut out = vec![[0.0; 3]; self.width as usize * self.height as usize];
         let scale = 1.0 / self.iterations.max(1) as f64;
-        self.for_each_pixel(|x, y, sum, _| {
-            out[(y * self.width + x) as usize] = Rgb::from(sum.map(|s| (s * scale) as f32));
-        });
+        self.for_each_pixel(|x, y, sum, _| out[(y * self.width + x) as usize] = sum.map(|s| s * scale));
         out
+    }
+
+    /// [`Film::mean_f64`], rounded to single precision.
+    pub fn mean(&self) -> Vec<Rgb> {
+        self.mean_f64().into_iter().map(|p| Rgb::from(p.map(|v| v as f32))).collect()
     }
 
     /// Variance of each pixel's mean, estimated from its samples; zero before the second iteration.
@@ -94,13 +113,14 @@ impl Film {
         out
     }
 
-    /// Adds the sums of another film of the same part of the picture; the number of iterations is the caller's business.
+    /// Adds the iterations of another film of the same part of the picture.
     ///
     /// # Panics
     /// If it is of another part.
     pub fn add(&mut self, other: &Film) {
         let window = |f: &Film| [f.x0, f.y0, f.width, f.height];
         assert_eq!(window(self), window(other));
+        self.iterations += other.iterations;
         for (tile, more) in self.tiles.iter_mut().zip(&other.tiles) {
             let into = |a: &mut [[f64; 3]], b: &[[f64; 3]]| {
                 a.as_flattened_mut().iter_mut().zip(b.as_flattened()).for_each(|(a, b)| *a += b);
@@ -130,6 +150,7 @@ mod tests {
     fn tiles_cover_every_pixel_once() {
         let mut film = Film::new([5, 7, 37, 21]);
         let mut buffer = SampleBuffer::default();
+        assert_eq!((film.begin_iteration(), film.iterations()), (0, 1));
         for tile in &mut film.tiles {
             buffer.clear(tile.pixels());
             for i in 0..tile.pixels() {
@@ -138,7 +159,6 @@ mod tests {
             }
             tile.commit(&buffer, None, 0);
         }
-        film.iterations = 1;
         let mean = film.mean();
         for y in 0..21 {
             for x in 0..37 {
@@ -151,7 +171,8 @@ mod tests {
     fn what_is_not_finite_is_counted_located_and_left_out() {
         let mut film = Film::new([0, 0, 4, 4]);
         let mut buffer = SampleBuffer::default();
-        for iteration in 0..2 {
+        for _ in 0..2 {
+            let iteration = film.begin_iteration();
             let tile = &mut film.tiles[0];
             buffer.clear(tile.pixels());
             for i in 0..16 {
@@ -162,7 +183,6 @@ mod tests {
             }
             tile.commit(&buffer, None, iteration);
         }
-        film.iterations = 2;
         assert_eq!(film.non_finite(), (1, vec![NonFinite { x: 2, y: 1, iteration: 1 }]));
         assert_eq!(film.mean()[0], Rgb::WHITE);
         assert_eq!(film.mean()[6], Rgb::grey(0.5));

@@ -69,7 +69,7 @@ pub struct Iteration<'a> {
 /// A rendering algorithm at work.
 pub trait Integrator: Send {
     /// Adds one sample per pixel to the film, in parallel on the current thread pool; the result must not depend on the
-    /// number of threads.
+    /// number of threads. The caller has begun the iteration ([`Film::begin_iteration`]), so that the film counts it already.
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats;
 
     /// What it has learnt from the iterations so far, for a checkpoint.

@@ -73,11 +73,11 @@ impl Racer {
     fn go(&mut self, scene: &PreparedScene, reference: &[[f64; 3]], time: Duration) {
         let end = self.clock.total() + SLICE;
         while self.clock.total() < end {
-            let iteration = Iteration { scene, seed: self.run.seed, index: self.film.iterations };
+            let iteration = Iteration { scene, seed: self.run.seed, index: self.film.begin_iteration() };
             let (integrator, film) = (&mut self.integrator, &mut self.film);
             let stats = self.clock.time(|| integrator.iterate(&iteration, film));
             self.stats.merge(&stats);
-            let n = self.film.iterations;
+            let n = self.film.iterations();
             // An iteration that would overshoot is not started.
             self.done = self.clock.total().mul_f64((n + 1) as f64 / n as f64) > time;
             if n.is_power_of_two() || self.done {
@@ -90,7 +90,7 @@ impl Racer {
     }
 
     fn note(&mut self, reference: &[[f64; 3]], width: usize) {
-        let picture = mean(&self.film);
+        let picture = self.film.mean_f64();
         let e = pixel_errors(&picture, reference);
         // Equal black in both pictures keeps a non-finite pixel from spreading through ꟻLIP's filters.
         let finite = |p: &[f64; 3]| p.iter().all(|v| v.is_finite());
@@ -98,7 +98,7 @@ impl Racer {
         let (a, b): (Vec<_>, Vec<_>) = pair.unzip();
         let flip = ldr_flip(&a, &b, width).values;
         self.run.points.push(Point {
-            iterations: self.film.iterations,
+            iterations: self.film.iterations(),
             seconds: self.clock.total().as_secs_f64(),
             mape: e.mape,
             relmse: e.relmse,
@@ -109,14 +109,6 @@ impl Racer {
             mean_ratio: e.mean_ratio,
         });
     }
-}
-
-/// The film's mean in double precision, row by row.
-pub fn mean(film: &Film) -> Vec<[f64; 3]> {
-    let mut out = vec![[0.0; 3]; film.width as usize * film.height as usize];
-    let scale = 1.0 / film.iterations.max(1) as f64;
-    film.for_each_pixel(|x, y, sum, _| out[(y * film.width + x) as usize] = sum.map(|s| s * scale));
-    out
 }
 
 /// Races every method with every seed, `time` each; the seeds one after the other, since all films of one are held at once. After
@@ -161,7 +153,7 @@ pub fn converge(
         runs.extend(racers.into_iter().map(|mut racer| {
             racer.run.rays = racer.stats.total();
             racer.run.non_finite = racer.film.non_finite().0;
-            racer.run.picture = mean(&racer.film);
+            racer.run.picture = racer.film.mean_f64();
             racer.run
         }));
         if interrupt.load(Ordering::Relaxed) {

@@ -117,8 +117,8 @@ pub fn profile(scene: &mut PreparedScene, task: &Task) -> Result<(Profile, Film,
     let mut film = Film::new(scene.window);
     let (mut clock, mut stats) = (Clock::default(), RayStats::default());
     let mut cpu = 0.0;
-    while film.iterations == 0 || clock.total().mul_f64(1.0 + 1.0 / film.iterations as f64) < task.time {
-        let iteration = Iteration { scene, seed: task.seed, index: film.iterations };
+    while film.iterations() == 0 || clock.total().mul_f64(1.0 + 1.0 / film.iterations() as f64) < task.time {
+        let iteration = Iteration { scene, seed: task.seed, index: film.begin_iteration() };
         let (ns, found) = cpu_time(task.threads, || clock.time(|| integrator.iterate(&iteration, &mut film)));
         stats.merge(&found);
         cpu += ns;
@@ -142,7 +142,7 @@ pub fn profile(scene: &mut PreparedScene, task: &Task) -> Result<(Profile, Film,
         method: task.method.label.clone(),
         parameters: task.method.parameters(),
         seed: task.seed,
-        iterations: film.iterations,
+        iterations: film.iterations(),
         wall_s: wall,
         phases: stats.phases.iter().collect(),
         work: Work::ALL
@@ -178,7 +178,7 @@ fn replay(
     let bare: Arc<dyn crate::ray::RayQuery> = Arc::from(std::mem::replace(&mut scene.query, Box::new(Nothing)));
     let (recorder, tape) = Recorder::new(bare.clone(), task.threads);
     scene.query = Box::new(recorder);
-    integrator.iterate(&Iteration { scene, seed: task.seed, index: film.iterations }, film);
+    integrator.iterate(&Iteration { scene, seed: task.seed, index: film.begin_iteration() }, film);
     scene.query = Box::new(bare.clone());
     let recording = tape.take();
 
@@ -215,7 +215,7 @@ fn replay(
 
 /// Processor nanoseconds per ray in a whole iteration.
 fn own_ns(scene: &PreparedScene, integrator: &mut dyn Integrator, film: &mut Film, task: &Task) -> f64 {
-    let iteration = Iteration { scene, seed: task.seed, index: film.iterations };
+    let iteration = Iteration { scene, seed: task.seed, index: film.begin_iteration() };
     let (ns, stats) = cpu_time(task.threads, || integrator.iterate(&iteration, film));
     ns / stats.total().max(1) as f64
 }

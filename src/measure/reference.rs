@@ -165,7 +165,7 @@ impl Reference {
             ("scene", name.to_owned()),
             ("integrator", method.spec.name.to_owned()),
             ("parameters", method.parameters()),
-            ("iterations", film.iterations.to_string()),
+            ("iterations", film.iterations().to_string()),
             ("seed", REFERENCE_SEED.to_string()),
             ("renderSeconds", format!("{:.3}", outcome.wall.as_secs_f64())),
         ];

@@ -78,7 +78,7 @@ impl Checkpoint {
     /// # Errors
     /// If the file system refuses.
     pub fn save(&self, path: &Path, film: &Film, state: &[u8]) -> Result<(), CheckpointError> {
-        let header = Checkpoint { iterations: film.iterations, non_finite_at: film.non_finite().1, ..self.clone() };
+        let header = Checkpoint { iterations: film.iterations(), non_finite_at: film.non_finite().1, ..self.clone() };
         let io = |source| CheckpointError::Io { path: path.to_owned(), source };
         let json = serde_json::to_string(&header).map_err(|e| io(e.into()))?;
         atomic_write(path, |w| {
@@ -127,7 +127,7 @@ impl Checkpoint {
         }
 
         let mut film = Film::new(self.window);
-        film.iterations = found.iterations;
+        film.set_iterations(found.iterations);
         let mut words = data[end + 1..].chunks_exact(8).map(|c| u64::from_le_bytes(c.try_into().unwrap_or_default()));
         let mut next = || words.next().ok_or_else(|| format("the file is cut short"));
         for tile in &mut film.tiles {

@@ -81,31 +81,36 @@ pub fn render(
 ) -> Outcome {
     let mut clock = Clock::default();
     let mut rays = RayStats::default();
-    let (cpu_before, first) = (cpu_seconds(), film.iterations);
+    let (cpu_before, first) = (cpu_seconds(), film.iterations());
     let stop = loop {
-        if budget.used_up(film.iterations, film.iterations - first, clock.total()) {
+        if budget.used_up(film.iterations(), film.iterations() - first, clock.total()) {
             break Stop::Budget;
         }
         if interrupt.load(Ordering::Relaxed) {
             break Stop::Interrupted;
         }
-        let iteration = Iteration { scene, seed, index: film.iterations };
+        let iteration = Iteration { scene, seed, index: film.begin_iteration() };
         let stats = clock.time(|| integrator.iterate(&iteration, film));
         rays.merge(&stats);
         let elapsed = clock.total();
         watch(
-            &Progress { iterations: film.iterations, rays: rays.total(), elapsed, done: share(&budget, film, elapsed) },
+            &Progress {
+                iterations: film.iterations(),
+                rays: rays.total(),
+                elapsed,
+                done: share(&budget, film.iterations(), elapsed),
+            },
             film,
             &|| integrator.state(),
         );
     };
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
-    let (iterations, notes) = (film.iterations - first, integrator.notes());
+    let (iterations, notes) = (film.iterations() - first, integrator.notes());
     Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations, notes }
 }
 
-pub(super) fn share(budget: &Budget, film: &Film, elapsed: Duration) -> f64 {
-    let by_iterations = budget.iterations.map_or(0.0, |n| film.iterations as f64 / n.max(1) as f64);
+pub(super) fn share(budget: &Budget, iterations: u64, elapsed: Duration) -> f64 {
+    let by_iterations = budget.iterations.map_or(0.0, |n| iterations as f64 / n.max(1) as f64);
     let by_time = budget.time.map_or(0.0, |t| elapsed.as_secs_f64() / t.as_secs_f64().max(1e-9));
     by_iterations.max(by_time).min(1.0)
 }

@@ -63,12 +63,7 @@ impl ErrorTarget {
 
     /// The estimate from two halves.
     pub fn estimate(&self, halves: &[Film; 2]) -> f64 {
-        let pictures = halves.each_ref().map(|film| {
-            let mut out = vec![[0.0; 3]; film.width as usize * film.height as usize];
-            let scale = 1.0 / film.iterations.max(1) as f64;
-            film.for_each_pixel(|x, y, sum, _| out[(y * film.width + x) as usize] = sum.map(|s| s * scale));
-            out
-        });
+        let pictures = halves.each_ref().map(Film::mean_f64);
         let both = pictures[0].iter().zip(&pictures[1]);
         let mean: Vec<[f64; 3]> = both.map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
         (self.of)(&pixel_errors(&pictures[0], &mean))
@@ -96,7 +91,7 @@ pub fn render_to_target(
     let (mut clock, mut rays, mut estimate) = (Clock::default(), RayStats::default(), None);
     let (cpu_before, mut next_look) = (cpu_seconds(), FIRST_LOOK);
     let stop = loop {
-        let n = film.iterations;
+        let n = halves[0].iterations() + halves[1].iterations();
         // Halves of equal size only: both seeds have had their turn.
         if n >= next_look && n.is_multiple_of(2) {
             let found = clock.time(|| target.estimate(&halves));
@@ -113,20 +108,19 @@ pub fn render_to_target(
             break Stop::Interrupted;
         }
         let half = (n % 2) as usize;
-        let iteration = Iteration { scene, seed: seeds[half], index: n / 2 };
+        let iteration = Iteration { scene, seed: seeds[half], index: halves[half].begin_iteration() };
         rays.merge(&clock.time(|| integrators[half].iterate(&iteration, &mut halves[half])));
-        film.iterations += 1;
         let elapsed = clock.total();
-        let done = share(&budget, film, elapsed);
-        watch(&Progress { iterations: film.iterations, rays: rays.total(), elapsed, done }, estimate);
+        let done = share(&budget, n + 1, elapsed);
+        watch(&Progress { iterations: n + 1, rays: rays.total(), elapsed, done }, estimate);
     };
-    if film.iterations >= 2 && film.iterations.is_multiple_of(2) {
-        estimate = Some(target.estimate(&halves));
-    }
     for half in &halves {
         film.add(half);
     }
+    if film.iterations() >= 2 && film.iterations().is_multiple_of(2) {
+        estimate = Some(target.estimate(&halves));
+    }
     let cpu_seconds = cpu_seconds().zip(cpu_before).map(|(after, before)| after - before);
-    let iterations = film.iterations;
+    let iterations = film.iterations();
     (Outcome { stop, rays, wall: clock.total(), cpu_seconds, iterations, notes: integrators[0].notes() }, estimate)
 }

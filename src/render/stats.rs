@@ -142,7 +142,7 @@ impl RenderStats {
         let kinds = || RayKind::ALL.iter().map(|&k| (k.name(), &outcome.rays.kinds[k as usize]));
         let rays = outcome.rays.total();
         RenderStats {
-            iterations: film.iterations,
+            iterations: film.iterations(),
             wall_s: wall,
             cpu_s: outcome.cpu_seconds,
             phases,

@@ -335,7 +335,6 @@ impl Integrator for Bidirectional {
             });
         });
         harvest.stats.phases.merge(&phases);
-        film.iterations += 1;
         self.samples = samples;
         if self.resamples() {
             self.learn();
@@ -400,9 +399,10 @@ impl Integrator for Bidirectional {
         let missing = self.sizing.as_ref().map_or(0, |s| s.missing(iteration.index));
         if missing >= 2 {
             let mut film = Film::new(scene.window);
-            (0..missing).for_each(|index| {
+            for _ in 0..missing {
+                let index = film.begin_iteration();
                 self.iterate(&Iteration { index, ..*iteration }, &mut film);
-            });
+            }
         }
         self.begin(iteration);
         self.prepare_replay(iteration);

@@ -157,7 +157,7 @@ impl Sizing {
         self.costs.light_image += each[1] * rays(&[RayKind::Light, RayKind::LightBounce, RayKind::ShadowLens]);
         self.costs.connections += each[2] * rays(&[RayKind::ShadowConnection]);
         self.probed += 1;
-        if self.probed == PROBED && film.iterations == PROBED {
+        if self.probed == PROBED && film.iterations() == PROBED {
             self.decided = Some(statistics.best(&variances(film), &self.costs));
             self.statistics = None;
         }
@@ -199,7 +199,7 @@ impl Sizing {
 
 /// For each tile the sum over samples of their variance, and its mean, squared.
 fn variances(film: &Film) -> Vec<(f64, f64)> {
-    let n = film.iterations as f64;
+    let n = film.iterations() as f64;
     film.tiles
         .iter()
         .map(|tile| {

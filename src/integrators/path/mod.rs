@@ -142,7 +142,6 @@ impl Integrator for PathTracer {
             a
         };
         let stats = phases.time("eye paths and film", || tiles.reduce(RayStats::default, sum));
-        film.iterations += 1;
         RayStats { phases, ..stats }
     }
 
