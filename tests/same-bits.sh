@@ -61,10 +61,10 @@ resumed() {
 
 first=
 for scene in $scenes; do
-    file=scenes/$scene/$scene.xml
-    first=${first:-$file}
+    xml=scenes/$scene/$scene.xml
+    first=${first:-$xml}
     for integrator in $integrators; do
-        picture "$scene-$integrator.pfm" "$file" -i "$integrator" --spp "$spp"
+        picture "$scene-$integrator.pfm" "$xml" -i "$integrator" --spp "$spp"
     done
 done
 
