@@ -21,7 +21,7 @@ trap 'rm -rf "$scratch"' EXIT
 kept=${OUT:-$scratch/old}
 mkdir -p "$kept" "$scratch/new"
 
-names() { "$1" list 2>/dev/null | awk '/^[a-z]/ { print $1 }'; }
+names() { "$1" list 2>/dev/null | sed -n 's/^\([a-z][a-z-]*\).*/\1/p'; }
 if [ $# -gt 0 ]; then
     integrators=$*
 else
