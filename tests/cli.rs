@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{BOX, Run, Sandbox};
+use common::{BOX, Process, Run, Sandbox};
 use lightsieve::image::{Encoding, Image, read_image};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use std::collections::BTreeSet;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 fn image(sandbox: &Sandbox, name: &str) -> Image {
@@ -29,17 +30,6 @@ fn keys(object: &serde_json::Value) -> BTreeSet<&str> {
 #[track_caller]
 fn render(sandbox: &Sandbox, arguments: &str) -> Run {
     sandbox.run(&format!("render scene.xml {arguments}")).expect(0, &[])
-}
-
-/// The program as a process of its own, with both ends at hand.
-fn start(sandbox: &Sandbox, arguments: &str) -> std::process::Child {
-    Command::new(env!("CARGO_BIN_EXE_lightsieve"))
-        .current_dir(sandbox.path(""))
-        .args(arguments.split_whitespace())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
 }
 
 #[test]
@@ -284,7 +274,6 @@ fn pictures_are_compared() {
     sandbox.run("compare small.pfm a.pfm").expect(2, &["8 x 8", "16 x 16"]);
 }
 
-/// Every integrator of the program.
 /// All integrators, and one whose pixels share light sub-paths.
 fn integrators() -> impl Iterator<Item = &'static str> {
     let shared = "bdpt -p light_paths=1/4 -p connections=1/2";
@@ -436,28 +425,29 @@ fn time_is_kept() {
     assert_eq!(stats(&sandbox, "s.json")["iterations"], 2);
 }
 
-/// Waits until the process catches SIGINT (bit 1 of a mask in its status).
-fn wait_for_handler(pid: u32) {
+/// Interrupts the process as soon as it catches SIGINT (bit 1 of a mask in its status) and has rendered for `time`.
+fn interrupt_after(process: &Process, time: Duration) {
+    let pid = process.child.id();
     let deadline = Instant::now() + Duration::from_secs(20);
     loop {
         let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
         let mask = status.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap();
         if u64::from_str_radix(mask.trim(), 16).unwrap() & 2 != 0 {
-            return;
+            break;
         }
         assert!(Instant::now() < deadline, "no handler");
         std::thread::sleep(Duration::from_millis(5));
     }
+    std::thread::sleep(time);
+    kill(Pid::from_raw(pid.try_into().unwrap()), Signal::SIGINT).unwrap();
 }
 
 #[test]
 fn interrupted_renders_are_written() {
     let sandbox = Sandbox::new();
-    let child = start(&sandbox, "render scene.xml -o a.pfm --stats s.json --checkpoint c --spp 1000000000");
-    wait_for_handler(child.id());
-    std::thread::sleep(Duration::from_millis(300));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    let run = Run::from(child.wait_with_output().unwrap()).expect(130, &["wrote a.pfm", "interrupted"]);
+    let process = sandbox.start("render scene.xml -o a.pfm --stats s.json --checkpoint c --spp 1000000000");
+    interrupt_after(&process, Duration::from_millis(300));
+    let run = process.finish().expect(130, &["wrote a.pfm", "interrupted"]);
     assert!(run.stdout.is_empty());
     let iterations = stats(&sandbox, "s.json")["iterations"].as_u64().unwrap();
     assert!(iterations > 0);
@@ -509,17 +499,17 @@ fn a_reader_that_went_away_is_no_panic() {
         "check-rays scene.xml --rays 10",
         "check-rays scene.xml --rays 10 --json",
     ] {
-        let mut child = start(&sandbox, arguments);
-        drop(child.stdout.take());
-        Run::from(child.wait_with_output().unwrap()).expect(0, &[]);
-        // The same for messages; then only the exit code can tell.
-        let mut child = start(&sandbox, arguments);
-        drop(child.stderr.take());
-        assert_eq!(Run::from(child.wait_with_output().unwrap()).code, Some(0), "{arguments}");
+        let mut process = sandbox.start(arguments);
+        drop(process.child.stdout.take());
+        process.finish().expect(0, &[]);
+        // Without a reader of messages the exit code alone can tell.
+        let mut process = sandbox.start(arguments);
+        drop(process.child.stderr.take());
+        assert_eq!(process.finish().code, Some(0), "{arguments}");
     }
-    let mut child = start(&sandbox, "render none.xml");
-    drop(child.stderr.take());
-    assert_eq!(child.wait().unwrap().code(), Some(3));
+    let mut process = sandbox.start("render none.xml");
+    drop(process.child.stderr.take());
+    assert_eq!(process.finish().code, Some(3));
 }
 
 #[test]

@@ -1,8 +1,10 @@
 //! A folder of its own for every test, a scene small enough to render in milliseconds, and the program run in that folder.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::Output;
-use std::time::Duration;
+use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// A closed box of grey walls with a lamp under its ceiling, seen from inside; 16 x 16 pixels.
@@ -53,15 +55,6 @@ pub struct Run {
     pub stderr: String,
 }
 
-impl From<Output> for Run {
-    fn from(o: Output) -> Run {
-        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("the program speaks UTF-8");
-        let run = Run { code: o.status.code(), stdout: text(&o.stdout), stderr: text(&o.stderr) };
-        assert!(!run.stderr.contains("panicked"), "{}", run.stderr);
-        run
-    }
-}
-
 impl Run {
     /// The exit code must be `code`, and standard error must contain each of `parts`.
     #[track_caller]
@@ -72,6 +65,58 @@ impl Run {
         }
         self
     }
+}
+
+/// Longest time that a command of a test may take.
+const TIMEOUT: Duration = Duration::from_secs(60);
+
+/// A running `lightsieve`. It is killed and reaped when dropped, so that a failed assertion leaves no process behind.
+pub struct Process {
+    pub child: Child,
+}
+
+impl Process {
+    /// Waits for the end of the process.
+    ///
+    /// # Panics
+    /// If it has not ended after [`TIMEOUT`], or if it panicked.
+    #[track_caller]
+    pub fn finish(mut self) -> Run {
+        let stdout = self.child.stdout.take().map(read_all);
+        let stderr = self.child.stderr.take().map(read_all);
+        let deadline = Instant::now() + TIMEOUT;
+        let status = loop {
+            if let Some(status) = self.child.try_wait().expect("the process can be waited for") {
+                break status;
+            }
+            assert!(Instant::now() < deadline, "the process has not ended after {TIMEOUT:?}");
+            std::thread::sleep(Duration::from_millis(2));
+        };
+        let text = |reader: Option<JoinHandle<Vec<u8>>>| {
+            let bytes = reader.map_or(Vec::new(), |r| r.join().expect("the pipe can be read"));
+            String::from_utf8(bytes).expect("the program writes UTF-8")
+        };
+        let run = Run { code: status.code(), stdout: text(stdout), stderr: text(stderr) };
+        assert!(!run.stderr.contains("panicked"), "{}", run.stderr);
+        run
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // Both fail if the process has been waited for already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Reads a pipe to its end on a thread of its own, as a full pipe would block the process.
+fn read_all(mut pipe: impl Read + Send + 'static) -> JoinHandle<Vec<u8>> {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        pipe.read_to_end(&mut bytes).expect("the pipe can be read");
+        bytes
+    })
 }
 
 /// A folder that goes away with the test.
@@ -108,11 +153,22 @@ impl Sandbox {
         self.write(name, changed);
     }
 
-    /// Runs `lightsieve` in the folder; arguments are separated by blanks.
+    /// Starts `lightsieve` in the folder; arguments are separated by blanks.
+    pub fn start(&self, arguments: &str) -> Process {
+        let child = Command::new(env!("CARGO_BIN_EXE_lightsieve"))
+            .current_dir(self.folder.path())
+            .args(arguments.split_whitespace())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        Process { child }
+    }
+
+    /// Runs `lightsieve` in the folder to its end; arguments are separated by blanks.
+    #[track_caller]
     pub fn run(&self, arguments: &str) -> Run {
-        let mut command = assert_cmd::cargo::cargo_bin_cmd!("lightsieve");
-        command.current_dir(self.folder.path()).timeout(Duration::from_secs(60));
-        command.args(arguments.split_whitespace());
-        Run::from(command.output().expect("the program runs"))
+        self.start(arguments).finish()
     }
 }
