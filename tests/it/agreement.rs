@@ -1,17 +1,12 @@
 //! Estimators of the same thing agree: integrators, heuristics, backends, crops, instances, formulas, and Mitsuba 3.
 
-#[path = "scenes/gallery.rs"]
-mod gallery;
-#[allow(dead_code, reason = "tests share what not each of them needs")]
-mod scenes;
-
-use gallery::{GALLERY, exhibit, file};
+use crate::support::gallery::{GALLERY, exhibit, file};
+use crate::support::pictures::{Picture, parse, prepare, sampled_by_pixel, takes, unbiased};
 use glam::{DMat4, DVec3, EulerRot};
 use lightsieve::integrators::{importance, path};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
 use lightsieve::scene::{SceneDesc, ShapeDesc};
-use scenes::{Picture, parse, prepare, sampled_by_pixel, takes, unbiased};
 use std::f64::consts::PI;
 
 /// Samples per pixel and render; the error of most pixels is about one percent.

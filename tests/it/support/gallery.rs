@@ -23,7 +23,7 @@ pub const GALLERY: [&str; 12] = [
 
 /// One of a scene's files.
 pub fn file(name: &str, ending: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes/gallery").join(format!("{name}.{ending}"))
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/gallery").join(format!("{name}.{ending}"))
 }
 
 /// A scene, which must be flawless.

@@ -1,12 +1,8 @@
 //! Bidirectional techniques one by one: each makes the same picture of every path length, together they make the picture, and the
 //! light image does not depend on threads, windows or interruptions.
 
-#[path = "scenes/gallery.rs"]
-mod gallery;
-#[allow(dead_code, reason = "tests share what not each of them needs")]
-mod scenes;
-
-use gallery::{GALLERY, exhibit};
+use crate::support::gallery::{GALLERY, exhibit};
+use crate::support::pictures::{RENDERS, SIGNIFICANCE, chance, prepare};
 use lightsieve::film::Film;
 use lightsieve::film::pyramid::Side;
 use lightsieve::integrators::{Integrator, IntegratorSpec, Params, bdpt, importance, light, resampling};
@@ -15,7 +11,6 @@ use lightsieve::prepared::{Features, PreparedScene};
 use lightsieve::ray::Backend;
 use lightsieve::render::{Budget, render};
 use rayon::prelude::*;
-use scenes::{RENDERS, SIGNIFICANCE, chance, prepare};
 use std::sync::atomic::AtomicBool;
 
 fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Integrator> {

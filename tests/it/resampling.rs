@@ -1,15 +1,10 @@
 //! Resampled connections agree with the path tracer whatever their parameters are: few or many light sub-paths, no cache points or
 //! three, one vertex in the second stage or all, any weights. So do connections to a light sub-path that pixels share, of which few are made.
 
-#[path = "scenes/gallery.rs"]
-mod gallery;
-#[allow(dead_code, reason = "tests share what not each of them needs")]
-mod scenes;
-
-use gallery::{GALLERY, exhibit};
+use crate::support::gallery::{GALLERY, exhibit};
+use crate::support::pictures::{Picture, prepare};
 use lightsieve::integrators::{IntegratorSpec, bdpt, importance, path, resampling};
 use lightsieve::ray::Backend;
-use scenes::{Picture, prepare};
 
 const SPP: u64 = 32;
 

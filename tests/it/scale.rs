@@ -1,15 +1,10 @@
 //! Neither the size of a scene nor its place changes its picture, and nothing leaks through closed walls at any size.
 
-#[path = "scenes/gallery.rs"]
-mod gallery;
-#[allow(dead_code, reason = "tests share what not each of them needs")]
-mod scenes;
-
-use gallery::{GALLERY, exhibit};
+use crate::support::gallery::{GALLERY, exhibit};
+use crate::support::pictures::{Picture, parse, prepare, takes, unbiased};
 use glam::{DMat4, DVec3};
 use lightsieve::ray::Backend;
 use lightsieve::scene::{BsdfKind, EmitterKind, SceneDesc};
-use scenes::{Picture, parse, prepare, takes, unbiased};
 
 const SPP: u64 = 32;
 /// Size and place: tiny, huge, far away.

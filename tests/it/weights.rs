@@ -1,12 +1,8 @@
 //! Weights of sampled paths against their definition, for every technique, any subset of techniques, and scenes with every
 //! feature: they sum to one, the fast ones are the slow ones, and they depend on nothing that they should not.
 
-#[path = "scenes/gallery.rs"]
-mod gallery;
-#[allow(dead_code, reason = "tests share what not each of them needs")]
-mod scenes;
-
-use gallery::{GALLERY, exhibit};
+use crate::support::gallery::{GALLERY, exhibit};
+use crate::support::pictures::{parse, prepare};
 use lightsieve::integrators::replay::Contribution;
 use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, importance, resampling};
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
@@ -15,7 +11,6 @@ use lightsieve::mis::{End, Heuristic, Joint, Node, Split, Techniques, Weigher};
 use lightsieve::path::{FullPath, Limits};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
-use scenes::{parse, prepare};
 
 /// Every path that bidirectional path tracing finds in a grid of pixels.
 fn found(

@@ -1,10 +1,7 @@
 //! Traps that other renderers fell into (pbrt-v3 issue 229, pbrt-v4 issue 347 and others), and bugs found here: one test each.
 
-#[allow(dead_code, reason = "tests share what not each of them needs")]
-mod scenes;
-
+use crate::support::pictures::{Picture, parse, prepare, sampled_by_pixel, takes, unbiased};
 use lightsieve::ray::Backend;
-use scenes::{Picture, parse, prepare, sampled_by_pixel, takes, unbiased};
 
 /// A camera above the plane z = 0.
 fn camera(width: u32, height: u32, filter: &str) -> String {

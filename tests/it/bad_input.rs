@@ -1,8 +1,6 @@
 //! Whatever is wrong with the input: the exit code, the place, what was expected, and an earlier picture left as it was.
 
-mod common;
-
-use common::{BOX, Run, Sandbox};
+use crate::support::program::{BOX, Run, Sandbox};
 
 /// Stands for a picture that took a night.
 const EARLIER: &[u8] = b"an earlier picture";

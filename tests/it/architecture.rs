@@ -318,7 +318,7 @@ fn the_source_keeps_the_rules() {
 
 #[test]
 fn the_documented_rooms_are_the_modules_in_their_order() {
-    let lib = include_str!("../src/lib.rs");
+    let lib = include_str!("../../src/lib.rs");
     let tokens = tokens(lib);
     let declared: Vec<&str> = (0..tokens.len())
         .filter(|&i| matches(&tokens, i, &["pub", "mod"]))

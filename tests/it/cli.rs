@@ -1,8 +1,6 @@
 //! Every command from outside, with small scenes: what is written, what is printed, what the exit code says.
 
-mod common;
-
-use common::{BOX, Process, Run, Sandbox};
+use crate::support::program::{BOX, Process, Run, Sandbox};
 use lightsieve::image::{Encoding, Image, read_image};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;

@@ -1,8 +1,6 @@
 //! Measuring from outside: convergence, profile, merge, bench, error targets, and the report as a file.
 
-mod common;
-
-use common::{Run, Sandbox};
+use crate::support::program::{BOX, Run, Sandbox};
 use lightsieve::film::Film;
 use lightsieve::image::ExrFile;
 use lightsieve::image::metrics::pixel_errors;
@@ -282,7 +280,7 @@ fn a_profile_adds_up() {
 fn a_bench_finds_what_is_worse() {
     let sandbox = Sandbox::new();
     std::fs::create_dir_all(sandbox.path("all/box")).unwrap();
-    sandbox.write("all/box/box.xml", common::BOX);
+    sandbox.write("all/box/box.xml", BOX);
     let bench = |more: &str| sandbox.run(&format!("bench all -i path,light {QUICK} --quiet {more}"));
     bench("--save base.json").expect(0, &[]);
     let base = json(std::str::from_utf8(&sandbox.read("base.json")).unwrap());

@@ -1,10 +1,7 @@
 //! Furnaces: scenes whose radiance is the same known number everywhere, for every integrator, material and camera.
 
-#[allow(dead_code, reason = "tests share what not each of them needs")]
-mod scenes;
-
+use crate::support::pictures::{Picture, SIGNIFICANCE, chance, parse, prepare, takes, unbiased};
 use lightsieve::ray::Backend;
-use scenes::{Picture, SIGNIFICANCE, chance, parse, prepare, takes, unbiased};
 
 const SIDE: usize = 8;
 const PINHOLE: &str = r#"<sensor type="perspective">"#;

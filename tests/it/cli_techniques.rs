@@ -1,8 +1,6 @@
 //! What the command line shows of bidirectional techniques, from outside: the pyramid, replays, switched off techniques.
 
-mod common;
-
-use common::Sandbox;
+use crate::support::program::Sandbox;
 use lightsieve::image::{Encoding, Image, read_image};
 
 fn image(sandbox: &Sandbox, name: &str) -> Image {

@@ -1,0 +1,19 @@
+//! Integration tests: the library and the program from outside, one module a topic. They are one crate, so that what they share
+//! is compiled and linked once.
+
+mod agreement;
+mod architecture;
+mod bad_input;
+mod cli;
+mod cli_techniques;
+mod furnace;
+mod image_metrics;
+mod images;
+mod measure;
+mod rays;
+mod regression;
+mod resampling;
+mod scale;
+mod support;
+mod techniques;
+mod weights;

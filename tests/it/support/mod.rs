@@ -1,0 +1,5 @@
+//! What tests of several topics use.
+
+pub mod gallery;
+pub mod pictures;
+pub mod program;
