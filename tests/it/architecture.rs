@@ -1,222 +1,25 @@
-//! The house rules, enforced on the text of `src/`: rooms import only rooms before them, `unsafe` lives in `ray`, only `app`
-//! prints, files stay short, and what reads files or command lines does not unwrap. Comments, literals and code that is
-//! compiled for tests alone do not count.
+//! The rules of the architecture, enforced on the text of `src/`: rooms import only rooms before them, no integrator imports
+//! another, `unsafe` is in one file, only `app` prints, files stay short, code that reads files or command lines does not unwrap,
+//! and streams of random numbers are distinct. Comments, literals and code that is compiled for tests alone do not count.
 
+use crate::support::rust_source::{matches, mentioned_paths, tokens, without_tests};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 const MAX_LINES: usize = 600;
+/// The one file with unsafe code.
+const UNSAFE_FILE: &str = "ray/embree.rs";
+/// Integrators that still import another one, as (importer, imported). An entry that is not needed any more is an error.
+const KNOWN_IMPORTS: [(&str, &str); 5] = [
+    ("bdpt", "resampling"),
+    ("importance", "bdpt"),
+    ("importance", "resampling"),
+    ("light", "bdpt"),
+    ("resampling", "bdpt"),
+];
 /// Rooms whose input comes from outside.
 const NO_UNWRAP: [&str; 3] = ["load", "app", "image"];
 const PRINTS: [&str; 5] = ["println", "eprintln", "print", "eprint", "dbg"];
-
-/// A word, or one other character; with its line.
-#[derive(Clone, Debug, PartialEq)]
-struct Token {
-    text: String,
-    line: usize,
-}
-
-/// Rust source without comments, literals and white space.
-fn tokens(source: &str) -> Vec<Token> {
-    let chars: Vec<char> = source.chars().collect();
-    let at = |i: usize| chars.get(i).copied().unwrap_or('\0');
-    let is_word = |c: char| c.is_alphanumeric() || c == '_';
-    let mut found = Vec::new();
-    let (mut i, mut line) = (0, 1);
-    while i < chars.len() {
-        let start = i;
-        match at(i) {
-            '/' if at(i + 1) == '/' => {
-                while i < chars.len() && at(i) != '\n' {
-                    i += 1;
-                }
-            }
-            '/' if at(i + 1) == '*' => {
-                let mut depth = 0;
-                loop {
-                    match (at(i), at(i + 1)) {
-                        ('/', '*') => (depth, i) = (depth + 1, i + 2),
-                        ('*', '/') => (depth, i) = (depth - 1, i + 2),
-                        _ => i += 1,
-                    }
-                    if depth == 0 || i >= chars.len() {
-                        break;
-                    }
-                }
-            }
-            '"' => i = end_of_string(&chars, i),
-            // 'x' and '\n' are characters, 'a without an end is a lifetime.
-            '\'' if at(i + 1) == '\\' => {
-                i += 3;
-                while i < chars.len() && at(i) != '\'' {
-                    i += 1;
-                }
-                i += 1;
-            }
-            '\'' if at(i + 2) == '\'' => i += 3,
-            '\'' => {
-                i += 1;
-                while is_word(at(i)) {
-                    i += 1;
-                }
-            }
-            c if is_word(c) => {
-                while is_word(at(i)) {
-                    i += 1;
-                }
-                let word: String = chars[start..i].iter().collect();
-                let hashes = (i..).take_while(|&k| at(k) == '#').count();
-                if ["r", "br", "cr"].contains(&word.as_str()) && at(i + hashes) == '"' {
-                    i += hashes + 1;
-                    while i < chars.len() && !(at(i) == '"' && (1..=hashes).all(|k| at(i + k) == '#')) {
-                        i += 1;
-                    }
-                    i += 1 + hashes;
-                } else {
-                    found.push(Token { text: word, line });
-                }
-            }
-            c => {
-                if !c.is_whitespace() {
-                    found.push(Token { text: c.to_string(), line });
-                }
-                i += 1;
-            }
-        }
-        i = i.min(chars.len());
-        line += chars[start..i].iter().filter(|&&c| c == '\n').count();
-    }
-    found
-}
-
-/// Index after the closing quote of the string that opens at `i`.
-fn end_of_string(chars: &[char], mut i: usize) -> usize {
-    i += 1;
-    while i < chars.len() && chars[i] != '"' {
-        i += if chars[i] == '\\' { 2 } else { 1 };
-    }
-    i + 1
-}
-
-fn matches(tokens: &[Token], at: usize, texts: &[&str]) -> bool {
-    texts.iter().enumerate().all(|(k, text)| tokens.get(at + k).is_some_and(|t| t.text == *text))
-}
-
-/// Index after the bracket that closes the one at `open`.
-fn after_closing(tokens: &[Token], open: usize) -> usize {
-    let mut depth = 0_usize;
-    for (i, token) in tokens.iter().enumerate().skip(open) {
-        match token.text.as_str() {
-            "(" | "[" | "{" => depth += 1,
-            ")" | "]" | "}" => depth -= 1,
-            _ => {}
-        }
-        if depth == 0 {
-            return i + 1;
-        }
-    }
-    tokens.len()
-}
-
-/// Length of `#[cfg(test)]`, `#[cfg(all(test, …))]` or `#[test]` at `at`, if one is there.
-fn test_attribute(tokens: &[Token], at: usize) -> Option<usize> {
-    let is = |texts: &[&str]| matches(tokens, at, texts);
-    let only_tests = is(&["#", "[", "test", "]"])
-        || is(&["#", "[", "cfg", "(", "test", ")", "]"])
-        || is(&["#", "[", "cfg", "(", "all", "(", "test"]);
-    only_tests.then(|| after_closing(tokens, at + 1) - at)
-}
-
-/// The program without its tests, and the names of modules in files of their own that are tests.
-fn without_tests(tokens: &[Token]) -> (Vec<Token>, Vec<String>) {
-    if matches(tokens, 0, &["#", "!", "[", "cfg", "(", "test", ")", "]"]) {
-        return (Vec::new(), Vec::new());
-    }
-    let (mut kept, mut modules) = (Vec::new(), Vec::new());
-    let mut i = 0;
-    while i < tokens.len() {
-        let Some(length) = test_attribute(tokens, i) else {
-            kept.push(tokens[i].clone());
-            i += 1;
-            continue;
-        };
-        i += length;
-        while matches(tokens, i, &["#", "["]) {
-            i = after_closing(tokens, i + 1);
-        }
-        // The item ends at its semicolon or with its body.
-        let item = i;
-        while i < tokens.len() && tokens[i].text != ";" && tokens[i].text != "{" {
-            i = if ["(", "["].contains(&tokens[i].text.as_str()) { after_closing(tokens, i) } else { i + 1 };
-        }
-        if tokens.get(i).is_some_and(|t| t.text == ";")
-            && let Some(module) = (item..i).find(|&k| tokens[k].text == "mod")
-        {
-            modules.push(tokens[module + 1].text.clone());
-        }
-        i = if tokens.get(i).is_some_and(|t| t.text == "{") { after_closing(tokens, i) } else { i + 1 };
-    }
-    (kept, modules)
-}
-
-/// Names that a path goes on with after its `::` at `at`: one, or the first of each member of a group.
-fn heads(tokens: &[Token], at: usize) -> Vec<(String, usize)> {
-    let Some(first) = tokens.get(at) else { return Vec::new() };
-    if first.text != "{" {
-        return vec![(first.text.clone(), first.line)];
-    }
-    let end = after_closing(tokens, at);
-    let mut names = Vec::new();
-    let mut i = at + 1;
-    let mut expected = true;
-    while i + 1 < end {
-        match tokens[i].text.as_str() {
-            "{" => i = after_closing(tokens, i) - 1,
-            "," => expected = true,
-            name if expected => {
-                names.push((name.to_owned(), tokens[i].line));
-                expected = false;
-            }
-            _ => {}
-        }
-        i += 1;
-    }
-    names
-}
-
-/// Names directly below the crate's root that the module `module` (its path from the root) mentions, with lines.
-fn root_names(tokens: &[Token], module: &[String]) -> Vec<(String, usize)> {
-    let mut found = Vec::new();
-    // Depth of the inline modules around, and of the brace that closes each.
-    let (mut depth, mut inline) = (0_usize, Vec::new());
-    let mut i = 0;
-    while i < tokens.len() {
-        match tokens[i].text.as_str() {
-            "mod" if tokens.get(i + 2).is_some_and(|t| t.text == "{") => inline.push(depth),
-            "{" => depth += 1,
-            "}" => {
-                depth = depth.saturating_sub(1);
-                inline.pop_if(|outer| *outer == depth);
-            }
-            "crate" if matches(tokens, i + 1, &[":", ":"]) => found.extend(heads(tokens, i + 3)),
-            "super" => {
-                let mut ups = 0;
-                while matches(tokens, i, &["super", ":", ":"]) {
-                    (ups, i) = (ups + 1, i + 3);
-                }
-                if ups > 0 && ups == module.len() + inline.len() {
-                    found.extend(heads(tokens, i));
-                }
-                // The token at `i` has not been looked at yet, except if `super` stood alone.
-                i += usize::from(ups == 0);
-                continue;
-            }
-            _ => {}
-        }
-        i += 1;
-    }
-    found
-}
 
 /// What breaks the rules in one file; `path` is relative to `src`.
 fn violations(path: &Path, source: &str, rooms: &[String]) -> Vec<String> {
@@ -231,8 +34,9 @@ fn violations(path: &Path, source: &str, rooms: &[String]) -> Vec<String> {
     let (tokens, _) = without_tests(&tokens(source));
     let place = |name: &str| rooms.iter().position(|r| r == name);
     if let Some(own) = place(room) {
-        for (name, line) in root_names(&tokens, &module) {
-            if place(&name).is_some_and(|other| other > own) {
+        for (path, line) in mentioned_paths(&tokens, &module) {
+            let name = path[0].as_str();
+            if place(name).is_some_and(|other| other > own) {
                 report(line, format!("{room} uses {name}, which stands behind it"));
             }
             if name == "*" {
@@ -245,8 +49,8 @@ fn violations(path: &Path, source: &str, rooms: &[String]) -> Vec<String> {
     for (i, token) in tokens.iter().enumerate() {
         let text = token.text.as_str();
         let next = |expected: &str| matches(&tokens, i + 1, &[expected]);
-        if text == "unsafe" && room != "ray" {
-            report(token.line, "unsafe outside ray".to_owned());
+        if text == "unsafe" && path != Path::new(UNSAFE_FILE) {
+            report(token.line, format!("unsafe outside {UNSAFE_FILE}"));
         }
         if PRINTS.contains(&text) && next("!") && room != "app" {
             report(token.line, format!("{text}! outside app"));
@@ -260,6 +64,7 @@ fn violations(path: &Path, source: &str, rooms: &[String]) -> Vec<String> {
             report(token.line, format!("{text}() in {room}"));
         }
     }
+    found.dedup();
     found
 }
 
@@ -290,30 +95,85 @@ fn source_files(folder: &Path, into: &mut Vec<PathBuf>) {
     }
 }
 
-#[test]
-fn the_source_keeps_the_rules() {
+/// All files of `src` that are not for tests alone, by their paths in it.
+fn sources() -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let rooms = documented_rooms(&std::fs::read_to_string(root.join("lib.rs")).unwrap());
     let mut files = Vec::new();
     source_files(&root, &mut files);
     files.sort();
-    let texts: Vec<(PathBuf, String)> = files
+    let mut texts: Vec<(PathBuf, String)> = files
         .iter()
         .map(|f| (f.strip_prefix(&root).unwrap().to_owned(), std::fs::read_to_string(f).unwrap()))
         .collect();
-
-    // Files that are modules for tests alone.
     let mut only_tests: Vec<Vec<String>> = Vec::new();
     for (path, text) in &texts {
         let (_, modules) = without_tests(&tokens(text));
         only_tests.extend(modules.into_iter().map(|name| [module_of(path), vec![name]].concat()));
     }
-    let found: Vec<String> = texts
+    texts.retain(|(path, _)| !only_tests.iter().any(|test| module_of(path).starts_with(test)));
+    texts
+}
+
+/// Which integrator's folder imports which other one's, with the place of the first such import.
+fn imports_among_integrators(sources: &[(PathBuf, String)]) -> BTreeMap<(String, String), String> {
+    let folder = |module: &[String]| (module.first()? == "integrators").then(|| module.get(1).cloned()).flatten();
+    let folders: BTreeSet<String> = sources
         .iter()
-        .filter(|(path, _)| !only_tests.iter().any(|test| module_of(path).starts_with(test)))
-        .flat_map(|(path, text)| violations(path, text, &rooms))
+        .filter(|(path, _)| path.components().count() > 2)
+        .filter_map(|(p, _)| folder(&module_of(p)))
         .collect();
+    let mut found = BTreeMap::new();
+    for (path, text) in sources {
+        let Some(own) = folder(&module_of(path)).filter(|f| folders.contains(f)) else { continue };
+        let (tokens, _) = without_tests(&tokens(text));
+        for (mentioned, line) in mentioned_paths(&tokens, &module_of(path)) {
+            if let Some(other) = folder(&mentioned).filter(|f| folders.contains(f) && *f != own) {
+                found.entry((own.clone(), other)).or_insert_with(|| format!("src/{}:{line}", path.display()));
+            }
+        }
+    }
+    found
+}
+
+/// Numbers of random streams (constants named `STREAM` or `…_STREAM`) with the names that they have.
+fn streams(sources: &[(PathBuf, String)]) -> BTreeMap<String, BTreeSet<String>> {
+    let mut found: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (_, text) in sources {
+        let (tokens, _) = without_tests(&tokens(text));
+        for (i, token) in tokens.iter().enumerate() {
+            let is_stream = token.text == "STREAM" || token.text.ends_with("_STREAM");
+            if is_stream && i > 0 && tokens[i - 1].text == "const" && matches(&tokens, i + 1, &[":", "u64", "="]) {
+                found.entry(tokens[i + 4].text.clone()).or_default().insert(token.text.clone());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_source_keeps_the_rules() {
+    let rooms = documented_rooms(include_str!("../../src/lib.rs"));
+    let found: Vec<String> = sources().iter().flat_map(|(path, text)| violations(path, text, &rooms)).collect();
     assert!(found.is_empty(), "\n{}", found.join("\n"));
+}
+
+#[test]
+fn integrators_do_not_import_each_other() {
+    let found = imports_among_integrators(&sources());
+    let known: BTreeSet<(String, String)> = KNOWN_IMPORTS.iter().map(|(a, b)| ((*a).into(), (*b).into())).collect();
+    let new: Vec<_> = found.iter().filter(|(pair, _)| !known.contains(pair)).collect();
+    assert!(new.is_empty(), "an integrator imports another one: {new:?}");
+    let gone: Vec<_> = known.iter().filter(|pair| !found.contains_key(pair)).collect();
+    assert!(gone.is_empty(), "no longer needed in KNOWN_IMPORTS: {gone:?}");
+}
+
+#[test]
+fn random_streams_have_numbers_of_their_own() {
+    let found = streams(&sources());
+    assert!(found.len() >= 7, "{found:?}");
+    // One name in two files is one stream: sub-paths from the camera are the same in all integrators.
+    let shared: Vec<_> = found.iter().filter(|(_, names)| names.len() > 1).collect();
+    assert!(shared.is_empty(), "{shared:?}");
 }
 
 #[test]
@@ -375,10 +235,47 @@ fn paths_inside_a_room_are_no_imports() {
 }
 
 #[test]
-fn unsafe_code_is_found_outside_ray_only() {
-    assert_eq!(check("math/a.rs", "fn f() {\n unsafe { g() }\n}"), ["src/math/a.rs:2: unsafe outside ray"]);
+fn unsafe_code_is_found_outside_its_file_only() {
+    let code = "fn f() {\n unsafe { g() }\n}";
+    for path in ["math/a.rs", "ray/mod.rs", "ray/embree/mod.rs"] {
+        assert_eq!(check(path, code), [format!("src/{path}:2: unsafe outside ray/embree.rs")]);
+    }
     assert!(check("ray/embree.rs", "fn f() { unsafe { g() } }").is_empty());
     assert!(check("math/a.rs", "#![deny(unsafe_code)] // unsafe\n/* unsafe */ const S: &str = \"unsafe\";").is_empty());
+}
+
+#[test]
+fn imports_among_integrators_are_found() {
+    let pairs = |path: &str, text: &str| -> Vec<(String, String)> {
+        let others = ["integrators/a/mod.rs", "integrators/b/mod.rs", "integrators/mod.rs", "integrators/params.rs"];
+        let all = others.iter().map(|p| (PathBuf::from(p), String::new())).chain([(path.into(), text.into())]);
+        imports_among_integrators(&all.collect::<Vec<_>>()).into_keys().collect()
+    };
+    let one = [("a".to_owned(), "b".to_owned())];
+    for source in [
+        "use crate::integrators::b::X;",
+        "use crate::{math, integrators::{Params, b::{X, Y}}};",
+        "use crate::integrators::{params::P, b};",
+        "fn f() { super::super::b::g(); }",
+        "mod inner { use super::super::super::b; }",
+    ] {
+        assert_eq!(pairs("integrators/a/x.rs", source), one, "{source}");
+    }
+    assert_eq!(pairs("integrators/a/mod.rs", "use super::b;"), one);
+    for source in
+        ["use crate::integrators::{a::X, params::P, Params};", "use super::b;", "use crate::b;", "use crate::mis::b;"]
+    {
+        assert!(pairs("integrators/a/x.rs", source).is_empty(), "{source}");
+    }
+    assert!(pairs("integrators/mod.rs", "use self::b; use crate::integrators::b::SPEC;").is_empty());
+    assert!(pairs("integrators/a/x.rs", "#[cfg(test)] mod tests { use crate::integrators::b; }").is_empty());
+}
+
+#[test]
+fn equal_numbers_of_streams_are_found() {
+    let text = "const A_STREAM: u64 = 1; pub const STREAM: u64 = 1; const B_STREAM: u64 = 2; const OTHER: u64 = 2;";
+    let found = streams(&[("a.rs".into(), text.into())]);
+    assert_eq!(found.values().map(BTreeSet::len).collect::<Vec<_>>(), [2, 1]);
 }
 
 #[test]

@@ -3,3 +3,4 @@
 pub mod gallery;
 pub mod pictures;
 pub mod program;
+pub mod rust_source;
