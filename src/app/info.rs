@@ -99,15 +99,22 @@ fn write_skeleton(args: &InfoArgs, scene: &PreparedScene) -> Result<(), Failure>
 
 pub(crate) fn list(args: &ListArgs) -> Result<(), Failure> {
     let Some(name) = &args.integrator else {
+        let width = column_width(integrators::REGISTRY.iter().map(|spec| spec.name));
         for spec in integrators::REGISTRY {
-            out!("{:12}{}", spec.name, spec.about);
+            out!("{:width$}{}", spec.name, spec.about);
         }
         return Ok(());
     };
     let spec = integrators::find(name).ok_or_else(|| unknown_integrator(name))?;
     out!("{}: {}\n", spec.name, spec.about);
+    let width = column_width(spec.params.iter().map(|p| p.name));
     for p in spec.params {
-        out!("  {:16}{}\n  {:16}({})", p.name, p.about, "", p.default.describe());
+        out!("  {:width$}{}\n  {:width$}({})", p.name, p.about, "", p.default.describe());
     }
     Ok(())
+}
+
+/// Width of a column that holds these names and two blanks.
+fn column_width<'a>(names: impl Iterator<Item = &'a str>) -> usize {
+    names.map(str::len).max().unwrap_or(0) + 2
 }
