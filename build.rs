@@ -40,7 +40,8 @@ mod embree {
 
     /// What to type when something is missing; printed with every error.
     const INSTALL: &str = "apt-get install -y libembree-dev libclang-dev";
-    const WITHOUT: &str = "or build without Embree (slower, pure Rust): cargo build --release --no-default-features";
+    const WITHOUT: &str =
+        "or build without Embree (slower, pure Rust): cargo build --release --no-default-features --features cli";
 
     pub fn bind() {
         let include_dirs = ["/usr/include", "/usr/local/include"];

@@ -32,4 +32,5 @@ pub mod film;
 pub mod integrators;
 pub mod render;
 pub mod measure;
+#[cfg(feature = "cli")]
 pub mod app;

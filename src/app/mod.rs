@@ -25,6 +25,7 @@ mod converge;
 mod info;
 mod measure_args;
 mod merge;
+mod processor;
 mod profile;
 mod pyramid;
 mod render;
@@ -72,6 +73,21 @@ impl Failure {
 
 /// Runs the program and says how it ended.
 pub fn main() -> ExitCode {
+    let missing = processor::missing_instruction_sets();
+    if !missing.is_empty() {
+        note!(
+            "error: this program was compiled for processors with {}, which this one lacks; build it on this machine with \
+             RUSTFLAGS=\"-C target-cpu=native\" cargo build --release",
+            missing.join(", ")
+        );
+        return ExitCode::from(2);
+    }
+    parse_and_run()
+}
+
+/// A function of its own, so that nothing of it is computed before the check of the processor.
+#[inline(never)]
+fn parse_and_run() -> ExitCode {
     let cli = match cli::Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
