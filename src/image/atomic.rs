@@ -1,4 +1,8 @@
 //! Files appear whole or not at all: written beside their place, flushed to the disk, then renamed over it.
+//!
+//! `tempfile::NamedTempFile::persist` is the rename alone: it replaces a symbolic link or a device by a file, gives the
+//! result the mode 0600 instead of that of the file it replaces, overwrites files that are write-protected, and flushes
+//! nothing. What is done about that here is most of this file, so that `tempfile` stays a dependency of tests.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -7,8 +11,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Writes a file through `write` such that `path` holds either what it held before or all of the new contents.
 ///
-/// A symbolic link is followed and stays; permissions of a file that is replaced are kept. Something that is there but is no
-/// regular file (a pipe, a device) is written to directly, since renaming would put a file in its place.
+/// A symbolic link is followed and stays; permissions of a file that is replaced are kept. Something that is there but
+/// is no regular file (a pipe, a device) is written to directly, since renaming would put a file in its place.
 ///
 /// # Errors
 /// Whatever opening, `write`, flushing or renaming reports. The temporary file is removed then.

@@ -1,4 +1,7 @@
 //! The formats with a text header: PGM and PPM (plain and binary, up to 16 bits), and PFM (floats, bottom row first).
+//!
+//! The crate `image` reads PGM and PPM too, but rounds samples whose maximum is neither 255 nor 65535 to 8 or 16 bits,
+//! and reads no PFM, whose header is the same. So all three are read here, and its feature `pnm` is off.
 
 use super::buffer::{Image, Pixels};
 use super::read::{Encoding, ImageFault, check_size, transfer_floats};

@@ -1,10 +1,13 @@
 //! Stanford PLY: ASCII and both binary byte orders, any order and type of properties, streamed.
 //!
-//! The file is never held as a whole: a chunk is read, converted into the mesh's own arrays, and forgotten. Counts in the header
-//! are believed only as far as the file is long enough for them, so that a broken header cannot ask for all memory.
+//! The file is never held as a whole: a chunk is read, converted into the mesh's own arrays, and forgotten. Counts in
+//! the header are believed only as far as the file is long enough for them, so that a broken header cannot ask for all
+//! memory. The crate `ply-rs` and its successor `ply-rs-bw` collect a value per element, with a `Vec` for each list,
+//! before a mesh can be made of them, and do not say at which byte a binary file is wrong; so neither is used.
 //!
-//! Known vertex properties: `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`, `texture_s texture_t`), `r g b` (or
-//! `red green blue`; eight-bit colours are taken as sRGB). Faces: `vertex_indices` or `vertex_index`; polygons become fans.
+//! Known vertex properties: `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`, `texture_s texture_t`), `r g
+//! b` (or `red green blue`; eight-bit colours are taken as sRGB). Faces: `vertex_indices` or `vertex_index`; polygons
+//! become fans.
 
 mod ascii;
 mod binary;
