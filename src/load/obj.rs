@@ -1,5 +1,6 @@
-//! Wavefront OBJ: polygons with texture coordinates and normals. Written by hand rather than taken from a library so that every
-//! mistake has its line, and so that nothing in a file can panic.
+//! Wavefront OBJ: polygons with texture coordinates and normals, read in one pass over the lines.
+//! Written by hand rather than taken from a library so that every mistake has its line, and so that nothing in a file
+//! can panic.
 
 use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
 use crate::math::Rgb;
@@ -14,6 +15,8 @@ use std::path::Path;
 pub(super) type Corner = [u32; 3];
 /// No index.
 pub(super) const NONE: u32 = u32::MAX;
+/// Some editors begin UTF-8 files with it.
+const BYTE_ORDER_MARK: char = '\u{feff}';
 
 /// An OBJ file, faces as triangles in the order of the file.
 #[derive(Debug, Default)]
@@ -24,11 +27,29 @@ pub(super) struct ObjFile {
     pub uvs: Vec<Vec2>,
     pub normals: Vec<Vec3>,
     pub triangles: Vec<[Corner; 3]>,
-    /// `usemtl`: the first triangle of a material, its name, and the line.
-    pub materials: Vec<(usize, String, u64)>,
-    /// `mtllib`: file and line.
-    pub libraries: Vec<(String, u64)>,
+    pub materials: Vec<MaterialUse>,
+    pub libraries: Vec<Library>,
+    /// Faces of fewer than three corners.
     pub skipped_faces: u64,
+}
+
+/// A `usemtl` statement.
+#[derive(Debug, PartialEq)]
+pub(super) struct MaterialUse {
+    pub name: String,
+    /// Index of the first triangle after the statement.
+    pub first_triangle: usize,
+    /// From 1.
+    pub line: u64,
+}
+
+/// A `mtllib` statement.
+#[derive(Debug)]
+pub(super) struct Library {
+    /// As written: a file's name, or several.
+    pub names: String,
+    /// From 1.
+    pub line: u64,
 }
 
 /// Reads an OBJ file as one mesh.
@@ -99,7 +120,8 @@ pub(super) fn for_each_line(
         number += 1;
         // Names in old files are in any encoding; numbers are ASCII.
         let text = String::from_utf8_lossy(&raw);
-        let text = text.split('#').next().unwrap_or("").trim();
+        let text = if number == 1 { text.trim_start_matches(BYTE_ORDER_MARK) } else { &text };
+        let text = without_comment(text).trim();
         if let Some(text) = text.strip_suffix('\\') {
             joined.push_str(text);
             joined.push(' ');
@@ -112,6 +134,20 @@ pub(super) fn for_each_line(
         }
     }
     if joined.is_empty() { Ok(()) } else { each(number, &joined) }
+}
+
+/// Cuts off a comment. It begins at a `#` anywhere, except that names may contain one (`usemtl Material #25`): after
+/// a keyword that a name follows, only a `#` that is a word by itself begins a comment.
+fn without_comment(line: &str) -> &str {
+    let Some(first) = line.find('#') else { return line };
+    let keyword = line.split_ascii_whitespace().next().unwrap_or("");
+    if !(matches!(keyword, "usemtl" | "mtllib" | "newmtl" | "bump" | "norm") || keyword.starts_with("map_")) {
+        return &line[..first];
+    }
+    let is_blank = |c: Option<char>| c.is_none_or(|c| c.is_ascii_whitespace());
+    let alone =
+        |&(at, _): &(usize, &str)| is_blank(line[..at].chars().next_back()) && is_blank(line[at + 1..].chars().next());
+    line.match_indices('#').find(alone).map_or(line, |(at, _)| &line[..at])
 }
 
 fn statement(file: &mut ObjFile, corners: &mut Vec<Corner>, number: u64, line: &str) -> Result<(), String> {
@@ -145,11 +181,15 @@ fn statement(file: &mut ObjFile, corners: &mut Vec<Corner>, number: u64, line: &
                 file.triangles.push([corners[0], pair[0], pair[1]]);
             }
         }
-        "usemtl" => file.materials.push((file.triangles.len(), rest.trim().to_owned(), number)),
-        "mtllib" => file.libraries.push((rest.trim().to_owned(), number)),
-        // Groups, names, smoothing, lines and points, free-form surfaces' parameters: nothing to see or nothing to keep.
-        "" | "g" | "o" | "s" | "l" | "p" | "vp" | "mg" | "lod" | "shadow_obj" | "trace_obj" | "bevel" | "c_interp"
-        | "d_interp" | "usemap" | "maplib" => {}
+        "usemtl" => {
+            let (name, first_triangle) = (rest.trim().to_owned(), file.triangles.len());
+            file.materials.push(MaterialUse { name, first_triangle, line: number });
+        }
+        "mtllib" => file.libraries.push(Library { names: rest.trim().to_owned(), line: number }),
+        // Groups, names, smoothing, polylines and points, weights of bones, parameters of free-form surfaces: not
+        // rendered.
+        "" | "g" | "o" | "s" | "l" | "p" | "vp" | "vw" | "mg" | "lod" | "shadow_obj" | "trace_obj" | "bevel"
+        | "c_interp" | "d_interp" | "usemap" | "maplib" => {}
         "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim" | "hole" | "scrv" | "sp"
         | "end" | "con" => {}
         other => {

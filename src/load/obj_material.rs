@@ -28,13 +28,23 @@ pub(super) struct Mtl {
     /// Phong exponent.
     pub shininess: Option<f32>,
     pub ior: Option<f32>,
-    /// One is opaque.
+    /// `d`: one is opaque.
     pub dissolve: Option<f32>,
+    /// `Tr`, an extension: zero is opaque.
+    pub transparency: Option<f32>,
     pub illumination: Option<u32>,
     pub map_diffuse: Option<Map>,
     pub map_specular: Option<Map>,
     pub map_emission: Option<Map>,
     pub map_dissolve: Option<Map>,
+}
+
+impl Mtl {
+    /// One is opaque. `d` is in the format; `Tr` is not, and exporters that write both disagree on its direction: `d`
+    /// wins.
+    pub(super) fn opacity(&self) -> f32 {
+        self.dissolve.or(self.transparency.map(|t| 1.0 - t)).unwrap_or(1.0)
+    }
 }
 
 /// A line that was not understood.
@@ -75,7 +85,7 @@ fn property(mtl: &mut Mtl, keyword: &str, rest: &str) -> Result<(), String> {
         "Ns" => mtl.shininess = Some(number(rest)?.max(0.0)),
         "Ni" => mtl.ior = Some(number(rest)?),
         "d" => mtl.dissolve = Some(number(rest.trim_start_matches("-halo"))?.clamp(0.0, 1.0)),
-        "Tr" => mtl.dissolve = Some(1.0 - number(rest)?.clamp(0.0, 1.0)),
+        "Tr" => mtl.transparency = Some(number(rest)?.clamp(0.0, 1.0)),
         "illum" => mtl.illumination = Some(rest.parse().map_err(|_| format!("`{rest}` is not an illumination model"))?),
         "map_Kd" => mtl.map_diffuse = Some(map(rest)?),
         "map_Ks" => mtl.map_specular = Some(map(rest)?),
@@ -160,15 +170,22 @@ mod tests {
 
     #[test]
     fn reads_properties_maps_and_options() {
-        let text = "# c\nnewmtl red wall\nKd 1 0.5 0\nNs 96\nTr 0.25\nillum 2\nmap_Kd -s 2 3 1 -clamp on tex tures\\a b.png\nnewmtl b\nKe 3\n";
+        let text = "# c\nnewmtl red wall\nKd 1 0.5 0\nNs 96\nTr 0.25\nillum 2\n\
+            map_Kd -s 2 3 1 -clamp on tex tures\\a b.png\nnewmtl b\nKe 3\n";
         let (all, complaints) = parse(text.as_bytes()).unwrap();
         assert!(complaints.is_empty(), "{complaints:?}");
         assert_eq!((all[0].name.as_str(), all[0].line), ("red wall", 2));
         assert_eq!(all[0].diffuse, Some(Rgb::new(1.0, 0.5, 0.0)));
-        assert_eq!(all[0].dissolve, Some(0.75));
+        assert_eq!((all[0].opacity(), all[1].opacity()), (0.75, 1.0));
         let map = all[0].map_diffuse.as_ref().unwrap();
         assert_eq!((map.file.as_str(), map.scale, map.clamp), ("tex tures/a b.png", [2.0, 3.0], true));
         assert_eq!(all[1].emission, Some(Rgb::grey(3.0)));
+    }
+
+    #[test]
+    fn dissolve_wins_over_transparency() {
+        let (all, _) = parse("newmtl a\nTr 1\nd 1\nnewmtl b\nd 0.75\nTr 0.5\n".as_bytes()).unwrap();
+        assert_eq!((all[0].opacity(), all[1].opacity()), (1.0, 0.75));
     }
 
     #[test]

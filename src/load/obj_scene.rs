@@ -1,9 +1,9 @@
-//! A model without a scene around it: OBJ with its MTL materials, or a lone PLY. The camera comes from the options, the light from
-//! emitting materials or, if there are none, from a sky of constant radiance.
+//! A model without a scene around it: OBJ with its MTL materials, or a lone PLY. The camera comes from the options, the
+//! light from emitting materials or, if there are none, from a sky of constant radiance.
 
 use super::assets::{Assets, ImageUse};
 use super::mesh::{self, LoadedMesh, MeshError, MeshOptions};
-use super::obj::{self, ObjFile};
+use super::obj::{self, Library, MaterialUse, ObjFile};
 use super::obj_material::{self, Map, Mtl};
 use super::report::Report;
 use super::{LoadOptions, framing, ply};
@@ -47,8 +47,10 @@ pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) 
     let file = file.map_err(|e| unreadable(path, &e, report)).ok()?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut materials: HashMap<String, (Mtl, Arc<Source>)> = HashMap::new();
-    for (library, line) in &file.libraries {
-        read_library(&folder.join(library.replace('\\', "/")), path, *line, &mut materials, report);
+    for library in &file.libraries {
+        for name in library_files(folder, library) {
+            read_library(&folder.join(name), path, library.line, &mut materials, report);
+        }
     }
 
     let mut model = Model { assets: Assets::new(options.strict), ..Model::default() };
@@ -57,8 +59,8 @@ pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) 
             format!("`{}`: {} faces of fewer than three corners are left out", path.display(), file.skipped_faces);
         report.push(Diagnostic::warning("load::mesh", message));
     }
-    for (name, line, ranges) in by_material(&file) {
-        let triangles = ranges.iter().flat_map(|r| &file.triangles[r.clone()]);
+    for MaterialGroup { name, line, triangles } in by_material(&file) {
+        let triangles = triangles.iter().flat_map(|range| &file.triangles[range.clone()]);
         let mut mesh = obj::mesh_of(&file, triangles);
         mesh::finish(&mut mesh, MeshOptions { flip_v: true, ..MeshOptions::default() });
         mesh.name = format!("{} ({name})", path.display());
@@ -90,6 +92,20 @@ pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) 
 fn unreadable(path: &Path, e: &MeshError, report: &mut Report) {
     let d = Diagnostic::error("load::mesh", format!("cannot read `{}`: {e}", path.display()));
     if matches!(e, MeshError::Io(_)) { report.push_io(d) } else { report.push(d) }
+}
+
+/// Files that a `mtllib` statement names, relative to `folder`. The format separates several files by blanks, while
+/// many exporters write one name with blanks in it; a file that is there decides.
+fn library_files(folder: &Path, library: &Library) -> Vec<String> {
+    // Backslashes separate folders in files from Windows.
+    let names = library.names.replace('\\', "/");
+    // The first of several that has a material wins: it is read last.
+    let words: Vec<String> = names.split_ascii_whitespace().rev().map(str::to_owned).collect();
+    if !folder.join(&names).exists() && words.iter().any(|word| folder.join(word).exists()) {
+        words
+    } else {
+        vec![names]
+    }
 }
 
 /// Reads an MTL file; one that is missing costs the colours only.
@@ -126,23 +142,34 @@ fn line_span(source: &Arc<Source>, line: u64) -> Span {
     Span { source: source.clone(), range: start..start + length }
 }
 
-/// Materials in the order of their first use, each with its line and its ranges of triangles.
-fn by_material(file: &ObjFile) -> Vec<(String, u64, Vec<Range<usize>>)> {
-    let mut all: Vec<(String, u64, Vec<Range<usize>>)> = Vec::new();
+/// All triangles of an OBJ file that have one material.
+#[derive(Debug)]
+pub(super) struct MaterialGroup {
+    /// Empty for triangles before the first `usemtl`.
+    pub name: String,
+    /// Line of the first `usemtl` that has triangles, from 1; 0 if there is none.
+    pub line: u64,
+    /// Indices of triangles, ascending.
+    pub triangles: Vec<Range<usize>>,
+}
+
+/// Triangles of an OBJ file by material, in the order of first use.
+pub(super) fn by_material(file: &ObjFile) -> Vec<MaterialGroup> {
+    let mut groups: Vec<MaterialGroup> = Vec::new();
     let mut known: HashMap<&str, usize> = HashMap::new();
-    let first = (0, String::new(), 0);
-    let starts: Vec<&(usize, String, u64)> = std::iter::once(&first).chain(&file.materials).collect();
-    for (i, (start, name, line)) in starts.iter().enumerate() {
-        let end = starts.get(i + 1).map_or(file.triangles.len(), |next| next.0);
-        if *start < end {
-            let at = *known.entry(name).or_insert_with(|| {
-                all.push((name.clone(), *line, Vec::new()));
-                all.len() - 1
+    let unnamed = MaterialUse { name: String::new(), first_triangle: 0, line: 0 };
+    let uses: Vec<&MaterialUse> = std::iter::once(&unnamed).chain(&file.materials).collect();
+    for (i, MaterialUse { name, first_triangle, line }) in uses.iter().enumerate() {
+        let end = uses.get(i + 1).map_or(file.triangles.len(), |next| next.first_triangle);
+        if *first_triangle < end {
+            let group = *known.entry(name).or_insert_with(|| {
+                groups.push(MaterialGroup { name: name.clone(), line: *line, triangles: Vec::new() });
+                groups.len() - 1
             });
-            all[at].2.push(*start..end);
+            groups[group].triangles.push(*first_triangle..end);
         }
     }
-    all
+    groups
 }
 
 /// A scene in the making.
@@ -193,15 +220,15 @@ impl Model {
         self.scene
     }
 
-    /// What a material becomes: mirrors and glass by the illumination model, else a diffuse base with a Phong highlight; seen from both
-    /// sides unless it transmits.
+    /// What a material becomes: mirrors and glass by the illumination model, else a diffuse base with a Phong
+    /// highlight; seen from both sides unless it transmits.
     fn material(&mut self, mtl: &Mtl, folder: &Path, span: Option<Span>) -> (BsdfId, Option<AreaEmission>) {
         let emission = self.color(mtl.map_emission.as_ref(), mtl.emission.unwrap_or(Rgb::BLACK), folder, span.clone());
         let emits = emission != ColorDesc::Constant(Rgb::BLACK);
         let emission = emits.then_some(AreaEmission { radiance: emission, span: span.clone() });
         let name = Some(mtl.name.as_str());
         let specular = mtl.specular.unwrap_or(Rgb::BLACK);
-        let dissolve = mtl.dissolve.unwrap_or(1.0);
+        let dissolve = mtl.opacity();
         let refracts = mtl.ior.is_some_and(|i| i > 1.0);
         if matches!(mtl.illumination, Some(4 | 6 | 7 | 9)) || (dissolve < 1.0 && refracts && mtl.map_dissolve.is_none())
         {

@@ -4,7 +4,8 @@ fn read(text: &str) -> Result<ObjFile, String> {
     parse(text.as_bytes()).map_err(|e| e.to_string())
 }
 
-const QUAD: &str = "# quad\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nusemtl a b\nf 1/1/1 2/2/1 3/3/1 4/4/1\n";
+const QUAD: &str = "# quad\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n\
+    usemtl a b\nf 1/1/1 2/2/1 3/3/1 4/4/1\n";
 
 #[test]
 fn corners_of_every_form() {
@@ -21,7 +22,17 @@ fn corners_of_every_form() {
         read(&format!("{tail}f 1//1 2//1 3//1\n")).unwrap().triangles,
         [[[0, NONE, 0], [1, NONE, 0], [2, NONE, 0]]]
     );
-    assert_eq!(read(QUAD).unwrap().materials, [(0, "a b".to_owned(), 11)]);
+    let material = MaterialUse { name: "a b".to_owned(), first_triangle: 0, line: 11 };
+    assert_eq!(read(QUAD).unwrap().materials, [material]);
+}
+
+#[test]
+fn comments_end_statements_but_not_names() {
+    let f =
+        read("\u{feff}# c\nusemtl Material #25\nusemtl red # brick\nmtllib a#b.mtl #\nv 1 2 3 #4\nv 1 2 3#\n").unwrap();
+    assert_eq!(f.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["Material #25", "red"]);
+    assert_eq!((f.libraries[0].names.as_str(), f.libraries[0].line), ("a#b.mtl", 4));
+    assert_eq!((f.positions.len(), f.colors.len()), (2, 0));
 }
 
 #[test]
@@ -64,7 +75,9 @@ fn mistakes_have_their_line() {
 
 proptest::proptest! {
     #[test]
-    fn mutated_files_never_panic(edits in proptest::collection::vec((0usize..200, proptest::prelude::any::<u8>()), 1..6)) {
+    fn mutated_files_never_panic(
+        edits in proptest::collection::vec((0usize..200, proptest::prelude::any::<u8>()), 1..6),
+    ) {
         let mut bytes = QUAD.as_bytes().to_vec();
         for (at, value) in edits {
             let at = at % bytes.len();

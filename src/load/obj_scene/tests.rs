@@ -72,6 +72,22 @@ fn a_missing_mtl_costs_the_colours_only() {
 }
 
 #[test]
+fn one_statement_names_several_libraries_or_one_with_blanks() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    std::fs::write(folder.path().join("a.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+    std::fs::write(folder.path().join("b c.mtl"), "newmtl blue\nKd 0 0 1\n").unwrap();
+    for (libraries, missing, known) in [("a.mtl gone.mtl", 1, 1), ("b c.mtl", 0, 1), ("gone.mtl d.mtl", 1, 0)] {
+        let text =
+            format!("mtllib {libraries}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl red\nf 1 2 3\nusemtl blue\nf 1 3 2\n");
+        std::fs::write(&path, text).unwrap();
+        let (_, found) = load_scene(&path, &LoadOptions::default()).unwrap();
+        let count = |code| found.list.iter().filter(|d| d.code == code).count();
+        assert_eq!((count("load::missing-mtl"), count("load::unknown-material")), (missing, 2 - known), "{libraries}");
+    }
+}
+
+#[test]
 fn the_camera_sees_all_corners_or_stands_where_it_is_told() {
     let (scene, _) = load(OBJ, None, &LoadOptions::default()).unwrap();
     let s = &scene.sensors[0];
