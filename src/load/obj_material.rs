@@ -1,4 +1,6 @@
-//! Wavefront MTL: materials of OBJ files, and what they become here.
+//! Wavefront MTL: materials of OBJ files. A line with a mistake costs that line only; the crate `tobj` gives up the
+//! whole library at the first one (and panics on `Kd 0.5`), and leaves `Tf`, `Tr`, `map_Ke` and the options of textures
+//! as text.
 
 use super::mesh::MeshError;
 use super::obj::for_each_line;
