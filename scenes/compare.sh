@@ -11,8 +11,8 @@
 #   paths        M = 50 ... 800                 (weights), Figs. 6, 7; (two stages), Figs. 8, 9
 #   samples      N = 1, 2, 4                    (weights), Fig. 9
 #   neighbours   N_c = 0, 1, 3                  (weights), section 6.1.5
-#   weights      what weights know              (weights), Fig. 2; (two stages), Fig. 10
-#   proposals    mixture against split          (weights), section 5.2; and what probabilities aim at
+#   weights      kinds of weights               (weights), Fig. 2; (two stages), Fig. 10
+#   proposals    proposal models                (weights), section 5.2; and target functions
 #   first-stage  M_1 = 10^3 ... 10^5            (two stages), Fig. 6
 #   last-stage   M_2 = 50 ... 800               (two stages), Fig. 7
 #
@@ -45,26 +45,28 @@ add() {
 }
 for figure in ${FIGURES:-}; do
     case $figure in
-    methods) add bdpt:skip=never pcbpt ris two-stage ;;
+    methods) add bdpt:allocation=full pcbpt ris two-stage ;;
     caching)
-        add bdpt:skip=never ic-bdpt skeleton
-        published=draws=apart,weights=balance,samples=1,rr_depth=2,keep=100,skip=never
-        add "ic-bdpt:$published" "skeleton:$published,acceptance=100"
+        add bdpt:allocation=full ic-bdpt skeleton
+        published=selection=per-length,weights=balance,connections_per_vertex=1,rr_depth=2,rr_scale=1,allocation=full
+        add "ic-bdpt:$published" "skeleton:$published,node_acceptance=1"
         ;;
-    paths) for m in 50 100 200 400 800; do add "ris:paths=$m" "two-stage:second_stage=$m"; done ;;
-    samples) for n in 1 2 4; do add "ris:samples=$n" "two-stage:samples=$n"; done ;;
-    neighbours) for n in 0 1 3; do add "ris:neighbours=$n" "two-stage:neighbours=$n"; done ;;
+    paths) for m in 50 100 200 400 800; do add "ris:presampled_paths=$m" "two-stage:second_stage_paths=$m"; done ;;
+    samples) for n in 1 2 4; do add "ris:connections_per_vertex=$n" "two-stage:connections_per_vertex=$n"; done ;;
+    neighbours) for n in 0 1 3; do add "ris:nearest_caches=$n" "two-stage:nearest_caches=$n"; done ;;
     weights)
-        add pcbpt:paths=100 pcbpt:paths=10000 ris:paths=100 ris:paths=10000
-        add two-stage:weights=balance two-stage:weights=ris two-stage:weights=two-stage
+        for m in 100 10000; do add "pcbpt:presampled_paths=$m" "ris:presampled_paths=$m"; done
+        add two-stage:weights=balance two-stage:weights=resampling-aware two-stage:weights=two-stage
         ;;
     proposals)
         for base in ris two-stage; do
-            for form in mixture asked split mixture,target=radiance mixture,metric=plain; do add "$base:proposals=$form"; done
+            for model in mixture mixture-with-visibility per-cache mixture,target=radiance mixture,metric=position; do
+                add "$base:proposal_model=$model"
+            done
         done
         ;;
-    first-stage) for m in 1000 10000 100000; do add "two-stage:paths=$m"; done ;;
-    last-stage) for m in 50 100 200 400 800; do add "two-stage:second_stage=$m"; done ;;
+    first-stage) for m in 1000 10000 100000; do add "two-stage:presampled_paths=$m"; done ;;
+    last-stage) for m in 50 100 200 400 800; do add "two-stage:second_stage_paths=$m"; done ;;
     *)
         echo "compare.sh: no figure is called $figure" >&2
         exit 2

@@ -74,7 +74,7 @@ pub(crate) struct WhatArgs {
     /// Integrator (see `lightsieve list`)
     #[arg(short, long, value_name = "NAME")]
     pub integrator: Option<String>,
-    /// Parameter of the integrator
+    /// Parameter of the integrator (see `lightsieve list -i NAME`)
     #[arg(short, long, value_name = "KEY=VALUE", value_parser = pair)]
     pub param: Vec<(String, String)>,
     /// Seed
@@ -179,6 +179,9 @@ pub(crate) struct ListArgs {
     /// Show this integrator's parameters
     #[arg(short, long, value_name = "NAME")]
     pub integrator: Option<String>,
+    /// Print the full descriptions
+    #[arg(short, long)]
+    pub long: bool,
 }
 
 #[derive(Debug, Args)]

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::cli::RenderArgs;
-use crate::integrators::{self, IntegratorSpec, Params};
+use crate::integrators::{self, IntegratorSpec, Params, Renamed};
 use crate::render::{Aov, Budget};
 use crate::scene::diag::nearest;
 use crate::scene::{Diagnostic, Diagnostics, SceneDesc};
@@ -76,15 +76,19 @@ impl Config {
                 continue;
             }
             // The scene's block is a proposal: what does not fit is said and left.
-            if let Err(e) = params.set(key, value) {
-                diagnostics.push(Diagnostic::warning("integrator::parameter", e.to_string()).at(span.clone()));
+            match params.set(key, value) {
+                Ok(renamed) => renamed.iter().for_each(|r| diagnostics.push(renamed_note(r).at(span.clone()))),
+                Err(e) => {
+                    diagnostics.push(Diagnostic::warning("integrator::parameter", e.to_string()).at(span.clone()));
+                }
             }
         }
         if let Some(depth) = max_depth {
             params.set("max_depth", &depth.to_string()).map_err(Failure::input)?;
         }
         for (key, value) in given {
-            params.set(key, value).map_err(Failure::input)?;
+            let renamed = params.set(key, value).map_err(Failure::input)?;
+            renamed.iter().for_each(|r| diagnostics.push(renamed_note(r)));
         }
         Ok((spec, params))
     }
@@ -108,6 +112,17 @@ impl Config {
         out!("seed = {}", args.what.seed);
         out!("threads = {}", self.threads);
     }
+}
+
+fn renamed_note(renamed: &Renamed) -> Diagnostic {
+    Diagnostic::note("integrator::renamed", renamed.to_string())
+}
+
+/// Which of these parameters have another name or value now.
+pub(crate) fn renamed(spec: &IntegratorSpec, given: &[(String, String)]) -> Result<Vec<Renamed>, Failure> {
+    let mut params = Params::defaults(spec);
+    let renamed: Result<Vec<_>, _> = given.iter().filter_map(|(k, v)| params.set(k, v).transpose()).collect();
+    renamed.map_err(Failure::input)
 }
 
 /// Says so, and which there are.

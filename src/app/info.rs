@@ -1,11 +1,9 @@
-//! `lightsieve info` and `lightsieve list`.
+//! `lightsieve info`.
 
 use super::Failure;
-use super::cli::{InfoArgs, ListArgs};
-use super::config::unknown_integrator;
+use super::cli::InfoArgs;
 use super::{report, skeleton};
 use crate::image::{OutputFormat, Pixels};
-use crate::integrators;
 use crate::prepared::{PrepareOptions, PreparedScene};
 use crate::ray::Backend;
 use crate::spatial::Skeleton;
@@ -95,26 +93,4 @@ fn write_skeleton(args: &InfoArgs, scene: &PreparedScene) -> Result<(), Failure>
         skeleton::write_image(path, scene, &made)?;
     }
     Ok(())
-}
-
-pub(crate) fn list(args: &ListArgs) -> Result<(), Failure> {
-    let Some(name) = &args.integrator else {
-        let width = column_width(integrators::REGISTRY.iter().map(|spec| spec.name));
-        for spec in integrators::REGISTRY {
-            out!("{:width$}{}", spec.name, spec.about);
-        }
-        return Ok(());
-    };
-    let spec = integrators::find(name).ok_or_else(|| unknown_integrator(name))?;
-    out!("{}: {}\n", spec.name, spec.about);
-    let width = column_width(spec.params.iter().map(|p| p.name));
-    for p in spec.params {
-        out!("  {:width$}{}\n  {:width$}({})", p.name, p.about, "", p.default.describe());
-    }
-    Ok(())
-}
-
-/// Width of a column that holds these names and two blanks.
-fn column_width<'a>(names: impl Iterator<Item = &'a str>) -> usize {
-    names.map(str::len).max().unwrap_or(0) + 2
 }

@@ -23,6 +23,7 @@ mod compare;
 mod config;
 mod converge;
 mod info;
+mod list;
 mod measure_args;
 mod merge;
 mod processor;
@@ -100,7 +101,7 @@ fn parse_and_run() -> ExitCode {
     let result = match cli.command {
         cli::Command::Render(args) => render::run(&args),
         cli::Command::Info(args) => info::run(&args),
-        cli::Command::List(args) => info::list(&args),
+        cli::Command::List(args) => list::run(&args),
         cli::Command::CheckRays(args) => check_rays::run(&args),
         cli::Command::Replay(args) => replay::run(&args),
         cli::Command::Compare(args) => compare::run(&args),

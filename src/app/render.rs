@@ -65,11 +65,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let scene = prepared.map_err(Failure::input)?;
     phases.insert("prepare", clock.total().as_secs_f64());
     phases.insert("tree", scene.tree_seconds);
-    if let Some(reason) = (config.spec.refuses)(scene.features) {
-        return Err(Failure::Input(format!("{} cannot render this scene: {reason}", config.spec.name)));
-    }
-
-    if let (Some(what), false) = ((config.spec.cannot)(scene.features), args.quiet) {
+    if let (Some(what), false) = ((config.spec.limitations)(scene.features), args.quiet) {
         note!("warning: {}: {what}", config.spec.name);
     }
 

@@ -8,9 +8,11 @@ use crate::integrators::Iteration;
 use crate::integrators::replay::{Contribution, Replay, VertexRecord};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::prepared::{PrepareOptions, PreparedScene};
+use crate::scene::Diagnostics;
 
 pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     let (desc, mut diagnostics) = report::load(&args.scene, true)?;
+    let said = diagnostics.list.len();
     let config = Config::of_integrator(
         args.what.integrator.as_deref(),
         args.what.max_depth,
@@ -18,6 +20,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
         &desc,
         &mut diagnostics,
     )?;
+    report::print(&Diagnostics { list: diagnostics.list.split_off(said) });
     let options = PrepareOptions {
         backend: Query::backend(args.what.query),
         threads: 1,
@@ -30,9 +33,6 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     }
     let scene = prepared.map_err(Failure::input)?;
     let (spec, params) = config;
-    if let Some(reason) = (spec.refuses)(scene.features) {
-        return Err(Failure::Input(format!("{} cannot render this scene: {reason}", spec.name)));
-    }
     let [x, y] = args.pixel;
     let [x0, y0, width, height] = scene.window;
     if x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height {

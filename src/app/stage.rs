@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::cli::{Query, SceneArgs};
-use super::config::Config;
+use super::config::{self, Config, unknown_integrator};
 use super::measure_args::{MeasureArgs, ReferenceArgs};
 use super::render::{catch_ctrl_c, progress_bar, show};
 use super::report;
@@ -47,8 +47,10 @@ impl<'a> Stage<'a> {
         let text = args.integrators.clone().unwrap_or_else(all);
         let methods = parse_methods(&text).map_err(Failure::Input)?;
         for m in &methods {
-            if crate::integrators::find(&m.integrator).is_none() {
-                return Err(super::config::unknown_integrator(&m.integrator));
+            let spec = crate::integrators::find(&m.integrator).ok_or_else(|| unknown_integrator(&m.integrator))?;
+            // Said here, once for all scenes.
+            for renamed in config::renamed(spec, &m.params)?.iter().filter(|_| !args.quiet) {
+                note!("note: {renamed}");
             }
         }
         let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -59,13 +61,13 @@ impl<'a> Stage<'a> {
         Ok(Stage { args, methods, threads, pool, interrupt })
     }
 
-    /// Loads and prepares a scene. Methods that refuse it are left out, which is said; all of them is an error.
+    /// Loads and prepares a scene.
     pub fn set(&self, path: &Path, references: Option<&ReferenceArgs>) -> Result<Set, Failure> {
         let (desc, mut diagnostics) = report::load(&self.scene_args(path), self.args.quiet)?;
         let said = diagnostics.list.len();
         let contenders: Result<Vec<Contender>, Failure> =
             self.methods.iter().map(|m| self.contender(m, &desc, &mut diagnostics)).collect();
-        let mut contenders = contenders?;
+        let contenders = contenders?;
         let judge = match references.and_then(|r| r.reference_integrator.as_ref()) {
             Some(text) => {
                 let methods = parse_methods(text).map_err(Failure::Input)?;
@@ -91,26 +93,12 @@ impl<'a> Stage<'a> {
         }
         let scene = prepared.map_err(Failure::input)?;
         let name = scene_name(path);
-        let mut reasons = vec![];
-        contenders.retain(|c| match (c.spec.refuses)(scene.features) {
-            Some(reason) => {
-                reasons.push(format!("{} cannot render {name}: {reason}", c.label));
-                false
-            }
-            None => true,
-        });
-        if contenders.is_empty() {
-            return Err(Failure::Input(reasons.join("; ")));
-        }
-        for text in reasons {
-            self.say(&text);
-        }
         for c in &contenders {
-            if let Some(what) = (c.spec.cannot)(scene.features) {
+            if let Some(what) = (c.spec.limitations)(scene.features) {
                 self.say(&format!("warning: {}: {what}", c.label));
             }
         }
-        let whole = |c: &&Contender| c.spec.unbiased && (c.spec.cannot)(scene.features).is_none();
+        let whole = |c: &&Contender| c.spec.unbiased && (c.spec.limitations)(scene.features).is_none();
         let judge = judge.or_else(|| contenders.iter().find(whole).cloned());
         Ok(Set { name, scene, contenders, judge })
     }

@@ -10,7 +10,7 @@ pub mod path;
 pub mod replay;
 pub mod resampling;
 
-pub use params::{ParamDefault, ParamError, ParamSpec, Params};
+pub use params::{ParamDefault, ParamError, ParamSpec, Params, Renamed};
 pub use replay::Replay;
 
 use crate::film::{Film, Pyramid};
@@ -36,18 +36,25 @@ pub struct IntegratorSpec {
     pub name: &'static str,
     /// Other names that scene files use for it.
     pub aliases: &'static [&'static str],
-    /// One sentence.
-    pub about: &'static str,
-    /// Parameters.
-    pub params: &'static [ParamSpec],
+    /// What it is, in one line of at most 80 characters.
+    pub short: &'static str,
+    /// What it does and when to use it, with the papers that describe it. Paragraphs are separated by a blank line.
+    pub long: &'static str,
+    /// Parameters, in groups that several integrators may share.
+    pub params: &'static [&'static [ParamSpec]],
     /// Its expectation is the rendering equation's solution.
     pub unbiased: bool,
-    /// Why it cannot render a scene with these features, if it cannot.
-    pub refuses: fn(Features) -> Option<String>,
-    /// What of a scene with these features it leaves out, if it does.
-    pub cannot: fn(Features) -> Option<String>,
+    /// What is missing from its pictures of a scene with these features, if anything is.
+    pub limitations: fn(Features) -> Option<String>,
     /// Builds it.
     pub build: fn(&Params) -> Box<dyn Integrator>,
+}
+
+impl IntegratorSpec {
+    /// Its parameters, in the order of declaration.
+    pub fn params(&self) -> impl Iterator<Item = &'static ParamSpec> + use<> {
+        self.params.iter().copied().flatten()
+    }
 }
 
 /// The integrator of that name or alias.

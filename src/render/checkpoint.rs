@@ -7,6 +7,7 @@
 use super::scene_hash::scene_hash;
 use crate::film::{Film, NonFinite};
 use crate::image::atomic_write;
+use crate::integrators::{self, Params};
 use crate::prepared::PreparedScene;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
@@ -73,6 +74,16 @@ impl Checkpoint {
         }
     }
 
+    /// The parameters have these values, by their present or earlier names.
+    fn has_params(&self, found: &[(String, String)]) -> bool {
+        if found.len() != self.params.len() {
+            return false;
+        }
+        let Some(spec) = integrators::find(&self.integrator) else { return found == self.params };
+        let named = |pairs: &[(String, String)]| Params::with(spec, pairs).ok();
+        named(found).is_some_and(|params| Some(params) == named(&self.params))
+    }
+
     /// Writes the film and what the integrator has learnt; whole or not at all.
     ///
     /// # Errors
@@ -116,7 +127,7 @@ impl Checkpoint {
         }
         let same = [
             ("another integrator", found.integrator == self.integrator),
-            ("other parameters of the integrator", found.params == self.params),
+            ("other parameters of the integrator", self.has_params(&found.params)),
             ("another seed", found.seed == self.seed),
             ("another picture size", found.film_size == self.film_size),
             ("another crop window", found.window == self.window),

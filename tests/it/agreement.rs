@@ -55,7 +55,7 @@ fn every_integrator_agrees_with_the_path_tracer() {
         let reference = Picture::render(&path::SPEC, &scene, &power, SPP, 100);
         for spec in unbiased().chain([&importance::IMPORTANCE_CACHING]).filter(|s| takes(s, &scene)) {
             for heuristic in ["balance", "power"] {
-                if heuristic == "power" && spec.params.iter().all(|p| p.name != "heuristic") {
+                if heuristic == "power" && spec.params().all(|p| p.name != "heuristic") {
                     continue;
                 }
                 let paths = if spec.name == "importance-caching" { "1024" } else { "100" };

@@ -121,6 +121,8 @@ fn imports_among_integrators(sources: &[(PathBuf, String)]) -> BTreeMap<(String,
         .iter()
         .filter(|(path, _)| path.components().count() > 2)
         .filter_map(|(p, _)| folder(&module_of(p)))
+        // Declarations of parameters are shared by all.
+        .filter(|f| f != "params")
         .collect();
     let mut found = BTreeMap::new();
     for (path, text) in sources {

@@ -194,13 +194,77 @@ fn integrators_are_listed() {
     let sandbox = Sandbox::new();
     let run = sandbox.run("list").expect(0, &[]);
     for spec in lightsieve::integrators::REGISTRY {
-        assert!(run.stdout.lines().any(|l| l.starts_with(spec.name) && l.contains(spec.about)), "{}", run.stdout);
-        let one = sandbox.run(&format!("list -i {}", spec.name)).expect(0, &[]);
-        assert!(one.stdout.contains(spec.about));
-        for p in spec.params {
-            assert!(one.stdout.contains(p.name) && one.stdout.contains(p.about), "{} {}", spec.name, p.name);
+        assert!(run.stdout.lines().any(|l| l.starts_with(spec.name) && l.ends_with(spec.short)), "{}", run.stdout);
+        let one = sandbox.run(&format!("list -i {}", spec.name)).expect(0, &[]).stdout;
+        assert!(one.contains(spec.short));
+        let table: Vec<&str> = one.lines().skip_while(|l| !l.contains("PARAMETER")).collect();
+        let column = |head: &str| table[0].find(head).unwrap();
+        let long = sandbox.run(&format!("list -i {} --long", spec.name)).expect(0, &[]).stdout;
+        assert!(long.lines().all(|l| l.chars().count() <= 110), "{long}");
+        // Lines are broken anywhere between words.
+        let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let long = words(&long);
+        assert!(long.contains(&words(spec.long)));
+        for p in spec.params() {
+            let row = table.iter().find(|l| l.trim_start().starts_with(&format!("{} ", p.name)));
+            let row: Vec<char> = row.unwrap_or_else(|| panic!("{} {}", spec.name, p.name)).chars().collect();
+            let from = |head: &str| row[column(head)..].iter().collect::<String>();
+            assert!(from("DEFAULT").starts_with(&format!("{} ", p.default_text())), "{} {}", spec.name, p.name);
+            assert_eq!(from("MEANING"), p.short, "{} {}", spec.name, p.name);
+            assert!(long.contains(&words(p.long)), "{} {}", spec.name, p.name);
         }
     }
+}
+
+#[test]
+fn earlier_names_of_parameters_work_and_are_noted_once() {
+    let sandbox = Sandbox::new();
+    let config = |options: &str| {
+        sandbox.run(&format!("render scene.xml -o out.exr --print-config -i two-stage {options}")).expect(0, &[])
+    };
+    let earlier = config("-p skip=never -p keep=60 -p paths=0 -p metric=plain");
+    let present = config("-p allocation=full -p rr_scale=60% -p presampled_paths=auto -p metric=position");
+    assert_eq!(earlier.stdout, present.stdout);
+    assert!(present.stdout.contains("rr_scale = 0.6\n"), "{}", present.stdout);
+    assert!(!present.stderr.contains("now"), "{}", present.stderr);
+    for note in ["`skip` is now called `allocation`", "`rr_scale=0.6`", "`presampled_paths=auto`", "`metric=position`"]
+    {
+        assert_eq!(earlier.stderr.matches(note).count(), 1, "{note}: {}", earlier.stderr);
+    }
+    assert!(!config("-p skip=never --quiet").stderr.contains("now"));
+    sandbox.run("render scene.xml -o out.exr --print-config -i ris -p keep=0").expect(2, &["keep = 0", "rr_scale"]);
+    // In the scene's own block, with its place.
+    sandbox.write_box_with(
+        "old.xml",
+        "<integrator type=\"path\">",
+        "<integrator type=\"ris\"><integer name=\"keep\" value=\"50\"/>",
+    );
+    let scene = sandbox.run("render old.xml -o out.exr --print-config").expect(0, &["`rr_scale=0.5`", "old.xml:"]);
+    assert!(scene.stdout.contains("rr_scale = 0.5\n"), "{}", scene.stdout);
+    // A measurement of several scenes says it once for all of them.
+    let measured = sandbox
+        .run("converge scene.xml old.xml -i bdpt:skip=never --cache cache --reference-spp 2 --time 30ms --seeds 1");
+    assert_eq!(measured.expect(0, &[]).stderr.matches("`skip` is now called").count(), 1);
+}
+
+#[test]
+fn a_checkpoint_with_earlier_names_is_resumed() {
+    let sandbox = Sandbox::new();
+    render(&sandbox, "-i ris --spp 1 --checkpoint c -p rr_scale=0.6");
+    let file = std::fs::read(sandbox.path("c")).unwrap();
+    let end = file.iter().position(|&b| b == b'\n').unwrap();
+    let header = String::from_utf8(file[..end].to_vec()).unwrap();
+    let with = |value: &str| {
+        let changed = header.replace("\"rr_scale\",\"0.6\"", &format!("\"keep\",\"{value}\""));
+        assert_ne!(changed, header);
+        std::fs::write(sandbox.path("old"), [changed.as_bytes(), &file[end..]].concat()).unwrap();
+    };
+    with("60");
+    render(&sandbox, "-i ris --spp 2 --resume old -p keep=60 -o resumed.pfm");
+    render(&sandbox, "-i ris --spp 2 -p rr_scale=0.6 -o whole.pfm");
+    assert_eq!(std::fs::read(sandbox.path("resumed.pfm")).unwrap(), std::fs::read(sandbox.path("whole.pfm")).unwrap());
+    with("61");
+    sandbox.run("render scene.xml -i ris --spp 2 --resume old -p rr_scale=0.6").expect(2, &["other parameters"]);
 }
 
 #[test]
@@ -379,9 +443,9 @@ fn a_crop_is_a_part_of_the_whole() {
         // A part of the picture may be worth other numbers of samples than the whole.
         let name = i.split(' ').next().unwrap();
         let listed = sandbox.run(&format!("list -i {name}")).expect(0, &[]).stdout;
-        let skip = if listed.contains("  skip ") { "-p skip=never" } else { "" };
-        render(&sandbox, &format!("-i {i} {skip} -o whole.pfm --size 40x24"));
-        render(&sandbox, &format!("-i {i} {skip} -o part.pfm --size 40x24 --crop 9,5,20,11"));
+        let full = if listed.contains("  allocation ") { "-p allocation=full" } else { "" };
+        render(&sandbox, &format!("-i {i} {full} -o whole.pfm --size 40x24"));
+        render(&sandbox, &format!("-i {i} {full} -o part.pfm --size 40x24 --crop 9,5,20,11"));
         let (whole, part) = (image(&sandbox, "whole.pfm"), image(&sandbox, "part.pfm"));
         assert_eq!((part.width, part.height), (20, 11));
         for y in 0..11 {

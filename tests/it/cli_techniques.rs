@@ -79,7 +79,7 @@ fn a_replay_is_the_rendered_sample() {
 fn a_replay_knows_the_iterations_before_it() {
     let sandbox = Sandbox::new();
     sandbox.write_box_with("scene.xml", "<film type=\"hdrfilm\">", "<film type=\"hdrfilm\"><rfilter type=\"box\"/>");
-    for integrator in ["ris", "two-stage", "bdpt -p skip=auto"] {
+    for integrator in ["ris", "two-stage", "bdpt -p allocation=auto"] {
         let options = format!("-i {integrator} -p techniques=-*:1 --seed 4");
         let pixel = |spp: u32| {
             sandbox.run(&format!("render scene.xml {options} --spp {spp} -o a.pfm --quiet")).expect(0, &[]);

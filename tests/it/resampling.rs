@@ -12,45 +12,87 @@ const SPP: u64 = 32;
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
     let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 39] = [
-        (ris, &[("paths", "1")]),
-        (ris, &[("paths", "2"), ("neighbours", "1")]),
-        (ris, &[("paths", "200"), ("neighbours", "0")]),
-        (ris, &[("weights", "balance"), ("keep", "100")]),
-        (ris, &[("doubt", "0"), ("keep", "100"), ("skip", "never"), ("trust", "full")]),
+        (ris, &[("presampled_paths", "1")]),
+        (ris, &[("presampled_paths", "2"), ("nearest_caches", "1")]),
+        (ris, &[("presampled_paths", "200"), ("nearest_caches", "0")]),
+        (ris, &[("weights", "balance"), ("rr_scale", "1")]),
+        (ris, &[("min_unseen_fraction", "0"), ("rr_scale", "1"), ("allocation", "full"), ("unseen_model", "constant")]),
         (ris, &[("target", "radiance")]),
-        (ris, &[("proposals", "split"), ("paths", "7")]),
-        (ris, &[("proposals", "split"), ("neighbours", "1"), ("samples", "2")]),
-        (two, &[("proposals", "split"), ("second_stage", "8"), ("doubt", "0"), ("keep", "100"), ("skip", "never")]),
-        (two, &[("proposals", "split"), ("paths", "100"), ("second_stage", "100"), ("neighbours", "0")]),
-        (two, &[("proposals", "asked"), ("second_stage", "16")]),
-        (ris, &[("proposals", "asked"), ("neighbours", "2"), ("paths", "20")]),
-        (two, &[("target", "radiance"), ("metric", "plain")]),
-        (ris, &[("epsilon", "1000000"), ("doubt", "1000000")]),
-        (two, &[("second_stage", "1")]),
-        (two, &[("second_stage", "16"), ("neighbours", "1"), ("samples", "3"), ("metric", "plain")]),
-        (two, &[("paths", "200"), ("second_stage", "200"), ("skip", "never")]),
-        (two, &[("paths", "300"), ("second_stage", "16"), ("neighbours", "0")]),
-        (two, &[("paths", "1"), ("second_stage", "1"), ("keep", "60")]),
-        (two, &[("weights", "ris"), ("second_stage", "8")]),
-        (two, &[("weights", "balance"), ("second_stage", "8")]),
+        (ris, &[("proposal_model", "per-cache"), ("presampled_paths", "7")]),
+        (ris, &[("proposal_model", "per-cache"), ("nearest_caches", "1"), ("connections_per_vertex", "2")]),
+        (
+            two,
+            &[
+                ("proposal_model", "per-cache"),
+                ("second_stage_paths", "8"),
+                ("min_unseen_fraction", "0"),
+                ("rr_scale", "1"),
+                ("allocation", "full"),
+            ],
+        ),
+        (
+            two,
+            &[
+                ("proposal_model", "per-cache"),
+                ("presampled_paths", "100"),
+                ("second_stage_paths", "100"),
+                ("nearest_caches", "0"),
+            ],
+        ),
+        (two, &[("proposal_model", "mixture-with-visibility"), ("second_stage_paths", "16")]),
+        (ris, &[("proposal_model", "mixture-with-visibility"), ("nearest_caches", "2"), ("presampled_paths", "20")]),
+        (two, &[("target", "radiance"), ("metric", "position")]),
+        (ris, &[("min_density_ratio", "1"), ("min_unseen_fraction", "1")]),
+        (two, &[("second_stage_paths", "1")]),
+        (
+            two,
+            &[
+                ("second_stage_paths", "16"),
+                ("nearest_caches", "1"),
+                ("connections_per_vertex", "3"),
+                ("metric", "position"),
+            ],
+        ),
+        (two, &[("presampled_paths", "200"), ("second_stage_paths", "200"), ("allocation", "full")]),
+        (two, &[("presampled_paths", "300"), ("second_stage_paths", "16"), ("nearest_caches", "0")]),
+        (two, &[("presampled_paths", "1"), ("second_stage_paths", "1"), ("rr_scale", "0.6")]),
+        (two, &[("weights", "resampling-aware"), ("second_stage_paths", "8")]),
+        (two, &[("weights", "balance"), ("second_stage_paths", "8")]),
         (&bdpt::SPEC, &[]),
         (&bdpt::SPEC, &[("rr_depth", "5")]),
         (&bdpt::SPEC, &[("light_paths", "1/4"), ("connections", "1/2")]),
         (&bdpt::SPEC, &[("light_paths", "1/16"), ("connections", "1/16"), ("heuristic", "power")]),
-        (&bdpt::SPEC, &[("light_paths", "1/16"), ("skip", "never")]),
-        (&importance::SKELETON, &[("acceptance", "0"), ("cells", "30")]),
-        (&importance::SKELETON, &[("paths", "7"), ("weights", "balance"), ("samples", "3")]),
-        (&importance::SKELETON, &[("draws", "apart"), ("weights", "balance"), ("samples", "1"), ("skip", "never")]),
-        (&importance::SKELETON, &[("draws", "apart"), ("acceptance", "0"), ("cells", "30")]),
-        (&importance::SKELETON, &[("distributions", "seen"), ("skip", "never")]),
-        (&importance::SKELETON, &[("distributions", "open"), ("draws", "apart"), ("weights", "balance")]),
+        (&bdpt::SPEC, &[("light_paths", "1/16"), ("allocation", "full")]),
+        (&importance::SKELETON, &[("node_acceptance", "0"), ("voxel_resolution", "30")]),
+        (&importance::SKELETON, &[("presampled_paths", "7"), ("weights", "balance"), ("connections_per_vertex", "3")]),
+        (
+            &importance::SKELETON,
+            &[
+                ("selection", "per-length"),
+                ("weights", "balance"),
+                ("connections_per_vertex", "1"),
+                ("allocation", "full"),
+            ],
+        ),
+        (&importance::SKELETON, &[("selection", "per-length"), ("node_acceptance", "0"), ("voxel_resolution", "30")]),
+        (&importance::SKELETON, &[("distributions", "visible"), ("allocation", "full")]),
+        (
+            &importance::SKELETON,
+            &[("distributions", "unoccluded"), ("selection", "per-length"), ("weights", "balance")],
+        ),
         (&importance::SKELETON, &[("distributions", "uniform")]),
-        (&importance::IC_BDPT, &[("distributions", "seen"), ("draws", "apart"), ("samples", "1")]),
-        (&importance::IC_BDPT, &[("distributions", "open")]),
-        (&importance::IC_BDPT, &[("paths", "50"), ("neighbours", "1")]),
-        (&importance::IC_BDPT, &[("neighbours", "0"), ("samples", "2")]),
-        (&importance::IC_BDPT, &[("draws", "apart"), ("weights", "balance"), ("paths", "7"), ("neighbours", "2")]),
-        (&importance::IC_BDPT, &[("draws", "apart"), ("skip", "never")]),
+        (
+            &importance::IC_BDPT,
+            &[("distributions", "visible"), ("selection", "per-length"), ("connections_per_vertex", "1")],
+        ),
+        (&importance::IC_BDPT, &[("distributions", "unoccluded")]),
+        (&importance::IC_BDPT, &[("presampled_paths", "50"), ("nearest_records", "1")]),
+        (&importance::IC_BDPT, &[("nearest_records", "0"), ("connections_per_vertex", "2")]),
+        (
+            &importance::IC_BDPT,
+            &[("selection", "per-length"), ("weights", "balance"), ("presampled_paths", "7"), ("nearest_records", "2")],
+        ),
+        (&importance::IC_BDPT, &[("selection", "per-length"), ("allocation", "full")]),
     ];
     // Diffuse and glossy; lit from everywhere; by lights that have no size.
     let shown = ["room", "environment", "delta-lights", "principled"];
@@ -61,11 +103,14 @@ fn parameters_do_not_change_the_expectation() {
             // A film of 64 pixels needs more than its share of places.
             let places = match spec.name {
                 "skeleton" => None,
-                "ic-bdpt" => Some(("records", "20000")),
-                _ => Some(("caches", "20000")),
+                "ic-bdpt" => Some(("record_density", "0.2")),
+                _ => Some(("cache_density", "0.2")),
             };
-            let params: Vec<(&str, &str)> =
-                [("skip", "auto"), ("keep", "30")].into_iter().chain(places).chain(params.iter().copied()).collect();
+            let params: Vec<(&str, &str)> = [("allocation", "auto"), ("rr_scale", "0.3")]
+                .into_iter()
+                .chain(places)
+                .chain(params.iter().copied())
+                .collect();
             let picture = Picture::render(spec, &scene, &params, SPP, 930);
             picture.assert_agrees(&reference, 0.0, &format!("{} {params:?}: {name}", spec.name));
         }
@@ -82,7 +127,7 @@ fn variance_falls_with_the_number_of_iterations_and_the_mean_stays() {
         [&resampling::PCBPT, &resampling::RIS, &resampling::TWO_STAGE, &importance::SKELETON, &importance::IC_BDPT]
     {
         let after = |iterations: u64| {
-            let params = [("caches", "20000"), ("second_stage", "16"), ("records", "20000")];
+            let params = [("cache_density", "0.2"), ("second_stage_paths", "16"), ("record_density", "0.2")];
             Picture::render(spec, &scene, &params, iterations, 740 + iterations)
         };
         let counts = [5, 20, 80];

@@ -16,8 +16,8 @@ use std::sync::atomic::AtomicBool;
 fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Integrator> {
     let mut values = Params::defaults(spec);
     // What is left out is decided by the picture, of which a crop sees only a part, and leaves few samples of some techniques.
-    if spec.params.iter().any(|p| p.name == "skip") {
-        values.set("skip", "never").unwrap();
+    if spec.params().any(|p| p.name == "allocation") {
+        values.set("allocation", "full").unwrap();
     }
     for (name, value) in params {
         values.set(name, value).unwrap();
@@ -62,21 +62,35 @@ fn moments(renders: &[Vec<f64>]) -> Vec<(f64, f64)> {
 
 #[test]
 fn each_technique_alone_makes_the_same_picture() {
-    let few: &[(&str, &str)] = &[("paths", "7"), ("caches", "50000")];
-    let many: &[(&str, &str)] = &[("paths", "300"), ("caches", "50000"), ("samples", "2")];
-    let two: &[(&str, &str)] =
-        &[("paths", "100"), ("caches", "50000"), ("second_stage", "16"), ("proposals", "mixture")];
+    let few: &[(&str, &str)] = &[("presampled_paths", "7"), ("cache_density", "0.5")];
+    let many: &[(&str, &str)] =
+        &[("presampled_paths", "300"), ("cache_density", "0.5"), ("connections_per_vertex", "2")];
+    let two: &[(&str, &str)] = &[
+        ("presampled_paths", "100"),
+        ("cache_density", "0.5"),
+        ("second_stage_paths", "16"),
+        ("proposal_model", "mixture"),
+    ];
     // Cache points of any surface may not see what a place sees: what the others draw then is a rare and bright path, and a larger
     // second stage has more of them.
-    let asked: &[(&str, &str)] = &[("paths", "100"), ("caches", "50000"), ("second_stage", "100")];
+    let asked: &[(&str, &str)] =
+        &[("presampled_paths", "100"), ("cache_density", "0.5"), ("second_stage_paths", "100")];
     for (spec, params) in [
         (&bdpt::SPEC, &[][..]),
         (&resampling::RIS, few),
         (&resampling::PCBPT, many),
         (&resampling::TWO_STAGE, two),
         (&resampling::TWO_STAGE, asked),
-        (&importance::IC_BDPT, &[("paths", "100"), ("records", "50000")]),
-        (&importance::IC_BDPT, &[("paths", "100"), ("records", "50000"), ("draws", "apart"), ("samples", "1")]),
+        (&importance::IC_BDPT, &[("presampled_paths", "100"), ("record_density", "0.5")]),
+        (
+            &importance::IC_BDPT,
+            &[
+                ("presampled_paths", "100"),
+                ("record_density", "0.5"),
+                ("selection", "per-length"),
+                ("connections_per_vertex", "1"),
+            ],
+        ),
     ] {
         techniques_agree(spec, params);
     }
@@ -94,7 +108,7 @@ fn techniques_agree(spec: &'static IntegratorSpec, params: &[(&str, &str)]) {
             .into_par_iter()
             .map(|seed| {
                 let depth = EDGES.to_string();
-                let params = [&[("max_depth", &*depth), ("rr_depth", "3"), ("skip", "never")], params].concat();
+                let params = [&[("max_depth", &*depth), ("rr_depth", "3"), ("allocation", "full")], params].concat();
                 let mut integrator = build(spec, &params);
                 assert!(integrator.keep_pyramid(scene.window, EDGES));
                 run(&scene, &mut *integrator, SPP, 40 + seed);

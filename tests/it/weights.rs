@@ -66,7 +66,7 @@ fn fast_weights_are_those_of_the_definition() {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
                 let heuristic = ["balance", "power"][i % 2];
                 let roulette = ["5", "1", "2"][i % 3];
-                let plain = ("skip", "never");
+                let plain = ("allocation", "full");
                 let params = [("techniques", techniques), ("heuristic", heuristic), ("rr_depth", roulette), plain];
                 for c in found(&bdpt::SPEC, &scene, &params, 12) {
                     let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
@@ -93,24 +93,24 @@ fn resampling_aware_weights_are_those_of_the_definition() {
             let paths = ["200", "7", "1"][i % 3];
             // A film of 64 pixels needs more than its share of cache points.
             let params = [
-                ("proposals", ["mixture", "split", "asked"][(i + i / 3) % 3]),
+                ("proposal_model", ["mixture", "per-cache", "mixture-with-visibility"][(i + i / 3) % 3]),
                 ("techniques", techniques),
                 ("rr_depth", roulette),
-                ("paths", paths),
-                ("caches", "50000"),
-                ("keep", ["100", "40"][i % 2]),
+                ("presampled_paths", paths),
+                ("cache_density", "0.5"),
+                ("rr_scale", ["1", "0.4"][i % 2]),
             ];
-            let two_stage = [&params[..], &[("second_stage", ["16", "1", "200"][i % 3])]].concat();
+            let two_stage = [&params[..], &[("second_stage_paths", ["16", "1", "200"][i % 3])]].concat();
             let one = found(&resampling::RIS, &scene, &params, 2);
             let drawn = [
-                ("draws", ["apart", "together"][(i + i / 2) % 2]),
-                ("samples", ["1", "4"][i % 2]),
+                ("selection", ["per-length", "all-lengths"][(i + i / 2) % 2]),
+                ("connections_per_vertex", ["1", "4"][i % 2]),
                 ("techniques", techniques),
                 ("rr_depth", roulette),
-                ("paths", ["1024", "20", "1"][i % 3]),
+                ("presampled_paths", ["1024", "20", "1"][i % 3]),
             ];
-            let skeleton = [&drawn[..], &[("acceptance", "0"), ("cells", "30")]].concat();
-            let records = [&drawn[..], &[("records", "20000")]].concat();
+            let skeleton = [&drawn[..], &[("node_acceptance", "0"), ("voxel_resolution", "30")]].concat();
+            let records = [&drawn[..], &[("record_density", "0.2")]].concat();
             let all = [
                 one,
                 found(&resampling::TWO_STAGE, &scene, &two_stage, 2),

@@ -16,12 +16,14 @@
 pub(super) mod eye_path;
 mod light_pass;
 pub(super) mod light_path;
+mod params;
 mod sharing;
-pub(super) mod sizing;
+mod sizing;
 mod worker;
 
+use super::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, TECHNIQUES, heuristic};
 use super::resampling::Resampler;
-use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params, Replay};
+use super::{Integrator, IntegratorSpec, Iteration, Params, Replay};
 use crate::film::{Film, FilmTile, LightImage, Pyramid, SampleBuffer};
 use crate::math::Rgb;
 use crate::math::sampler::PathSampler;
@@ -37,56 +39,23 @@ use sizing::Sizing;
 pub(super) use worker::Piece;
 use worker::{Harvest, Worker, add_to};
 
-/// Parameters that every bidirectional method has.
-pub(super) const MAX_DEPTH: ParamSpec = ParamSpec {
-    name: "max_depth",
-    about: "largest number of edges of a path; 1 shows emitters, 2 adds direct light; -1: no limit",
-    default: ParamDefault::Int(-1, -1, 1_000_000),
-};
-/// See [`MAX_DEPTH`].
-pub(super) const RR_DEPTH: ParamSpec = ParamSpec {
-    name: "rr_depth",
-    about: "vertex (1 is the first hit), counted from either end, from which Russian roulette may end a sub-path",
-    // Long paths are joined from short sub-paths: early roulette saves far more connections than it costs in variance.
-    default: ParamDefault::Int(2, 1, 1_000_000),
-};
-/// See [`MAX_DEPTH`].
-pub(super) const HIDE_EMITTERS: ParamSpec = ParamSpec {
-    name: "hide_emitters",
-    about: "emitters that the camera sees directly are black",
-    default: ParamDefault::Bool(false),
-};
-
-/// See [`MAX_DEPTH`].
-pub(super) const TECHNIQUES: ParamSpec = ParamSpec {
-    name: "techniques",
-    about: "pairs light:eye of vertex numbers that are joined, e.g. all,-0:* (no hits of lights) or *:1 (light tracing)",
-    // Lights that the lens sees are met by eye walks, at every sample; splats of the light itself could only add noise.
-    default: ParamDefault::Techniques("-1:1"),
-};
-
 /// The registry's line.
 pub static SPEC: IntegratorSpec = IntegratorSpec {
     name: "bdpt",
     aliases: &[],
-    about: "Bidirectional path tracing: sub-paths from the camera and from the lights, joined in every way and combined by multiple importance sampling",
+    short: "Bidirectional path tracing",
+    long: "A sub-path from the camera and one from a light are connected in every possible way, and the techniques \
+        are combined by multiple importance sampling. It renders caustics and light that arrives by way of other \
+        rooms. By default pixels share light sub-paths and evaluate some of the connections only, where that pays; \
+        allocation=full is the published method.\n\n\
+        Lafortune and Willems 1993, \"Bi-directional path tracing\"; Veach and Guibas 1994, \"Bidirectional \
+        estimators for light transport\"; Veach 1997, chapter 10.",
     params: &[
-        MAX_DEPTH,
-        RR_DEPTH,
-        HIDE_EMITTERS,
-        ParamSpec {
-            name: "heuristic",
-            about: "how techniques share a path",
-            default: ParamDefault::Choice("balance", &["balance", "power"]),
-        },
-        TECHNIQUES,
-        sizing::parameter("auto"),
-        sizing::LIGHT_PATHS,
-        sizing::CONNECTIONS,
+        &[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS, heuristic("balance"), TECHNIQUES],
+        &[ALLOCATION, params::LIGHT_PATHS, params::CONNECTIONS],
     ],
     unbiased: true,
-    refuses: |_| None,
-    cannot: |_| None,
+    limitations: |_| None,
     build: |params| {
         let heuristic = if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power };
         let mut this = Bidirectional::new(params, heuristic, params.techniques("techniques"));

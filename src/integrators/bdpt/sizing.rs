@@ -9,47 +9,29 @@
 
 use super::Found;
 use crate::film::{Film, TILE};
-use crate::integrators::{ParamDefault, ParamSpec, Params};
+use crate::integrators::Params;
 use crate::mis::{Contribution, Costs, Effort, EffortStatistics};
 use crate::ray::{RayKind, RayStats};
 
-/// Whether to decide.
-pub(in crate::integrators) const fn parameter(default: &'static str) -> ParamSpec {
-    ParamSpec {
-        name: "skip",
-        about: "auto: after two iterations, take fewer samples of connections and of light tracing where a scene is better off without",
-        default: ParamDefault::Choice(default, &["auto", "never"]),
-    }
-}
-
-/// Numbers of samples as fractions of the full ones, for people.
-const FRACTIONS: [(&str, f32); 5] = [("1", 1.0), ("1/2", 0.5), ("1/4", 0.25), ("1/8", 0.125), ("1/16", 0.0625)];
-/// Light sub-paths.
-pub(super) const LIGHT_PATHS: ParamSpec = ParamSpec {
-    name: "light_paths",
-    about: "light sub-paths per pixel, each joined with as many pixels as that leaves; auto: as skip says",
-    default: ParamDefault::Choice("auto", &["auto", "1", "1/4", "1/16"]),
-};
-/// Connections.
-pub(super) const CONNECTIONS: ParamSpec = ParamSpec {
-    name: "connections",
-    about: "share of the connections of an eye sub-path with its light sub-path that are made; auto: as skip says",
-    default: ParamDefault::Choice("auto", &["auto", "1", "1/2", "1/4", "1/8", "1/16"]),
-};
+/// Numbers of light sub-paths that may be decided, as fractions of the full number.
+const LIGHT_PATHS: [f32; 3] = [1.0, 0.25, 0.0625];
+/// Numbers of connections that may be decided, as fractions of the full number.
+const CONNECTIONS: [f32; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 
 /// What may be decided where connections are not resampled.
 pub(super) fn candidates(params: &Params) -> Vec<Effort> {
-    let choices = |spec: &ParamSpec| -> Vec<f32> {
-        let ParamDefault::Choice(auto, all) = spec.default else { return vec![1.0] };
-        let wanted = |name: &str| match (params.choice(spec.name), params.choice("skip")) {
-            (chosen, _) if chosen != auto => name == chosen,
-            (_, "never") => name == "1",
-            _ => true,
-        };
-        FRACTIONS.iter().filter(|(name, _)| all.contains(name) && wanted(name)).map(|(_, value)| *value).collect()
+    let full = params.choice("allocation") == "full";
+    let candidates = |name: &str, all: &[f32]| match params.auto_float(name) {
+        Some(fixed) => vec![nearest_power_of_two(fixed)],
+        None if full => vec![1.0],
+        None => all.to_vec(),
     };
-    let (light_paths, connections) = (choices(&LIGHT_PATHS), choices(&CONNECTIONS));
-    pairs(&light_paths, &connections)
+    pairs(&candidates("light_paths", &LIGHT_PATHS), &candidates("connections", &CONNECTIONS))
+}
+
+/// The power of two with the nearest logarithm.
+fn nearest_power_of_two(x: f64) -> f32 {
+    x.log2().round().exp2() as f32
 }
 
 fn pairs(light_image: &[f32], connections: &[f32]) -> Vec<Effort> {

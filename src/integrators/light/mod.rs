@@ -4,7 +4,8 @@
 //! A pinhole or lens that looks at the world through a mirror or a pane is never reached: such paths are missing.
 
 use super::IntegratorSpec;
-use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH};
+use super::bdpt::Bidirectional;
+use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL};
 use crate::mis::{Heuristic, Techniques};
 use crate::prepared::Features;
 
@@ -12,11 +13,14 @@ use crate::prepared::Features;
 pub static SPEC: IntegratorSpec = IntegratorSpec {
     name: "light",
     aliases: &["ptracer"],
-    about: "Light tracing: sub-paths from the lights, each vertex connected to the lens",
-    params: &[MAX_DEPTH, RR_DEPTH, HIDE_EMITTERS],
+    short: "Light tracing: sub-paths from the lights, each vertex connected to the lens",
+    long: "It renders caustics well, and nothing that the camera sees in a mirror or through glass. It is \
+        bidirectional path tracing with the techniques t = 1 alone.\n\n\
+        Dutré, Lafortune and Willems 1993, \"Monte Carlo light tracing with direct computation of pixel \
+        intensities\"; Veach 1997, section 8.3.4.",
+    params: &[&[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS]],
     unbiased: true,
-    refuses: |_| None,
-    cannot: |features| {
+    limitations: |features| {
         (features.contains(Features::SPECULAR) || features.contains(Features::MASKS)).then(|| {
             "what the camera sees in mirrors, and through glass or masks, stays black: no connection from a light can reach it".into()
         })

@@ -6,8 +6,9 @@
 //! over these two densities, so the weights of a path sum to one. Delta lights are reached by next event alone, and what follows a
 //! delta lobe by hits alone, each with weight one.
 
+use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_UNIDIRECTIONAL, heuristic};
 use super::replay::{Contribution, Replay};
-use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, ParamSpec, Params};
+use super::{Integrator, IntegratorSpec, Iteration, Params};
 use crate::emit::{DirectSample, Light};
 use crate::film::{Film, FilmTile, Part, SampleBuffer};
 use crate::math::sampler::{PathSampler, Purpose};
@@ -23,32 +24,15 @@ use rayon::prelude::*;
 pub static SPEC: IntegratorSpec = IntegratorSpec {
     name: "path",
     aliases: &["volpath", "volpathmis", "prb"],
-    about: "Path tracing from the camera, with direct light sampled at every vertex and combined with hits by multiple importance sampling",
-    params: &[
-        ParamSpec {
-            name: "max_depth",
-            about: "largest number of edges of a path; 1 shows emitters, 2 adds direct light; -1: no limit",
-            default: ParamDefault::Int(-1, -1, 1_000_000),
-        },
-        ParamSpec {
-            name: "rr_depth",
-            about: "vertex (1 is the first hit) from which Russian roulette may end a path",
-            default: ParamDefault::Int(5, 1, 1_000_000),
-        },
-        ParamSpec {
-            name: "hide_emitters",
-            about: "emitters that the camera sees directly are black",
-            default: ParamDefault::Bool(false),
-        },
-        ParamSpec {
-            name: "heuristic",
-            about: "how the two techniques share a path",
-            default: ParamDefault::Choice("power", &["balance", "power"]),
-        },
-    ],
+    short: "Path tracing with next-event estimation",
+    long: "Paths are traced from the camera. At every vertex a light is sampled, and the sample is combined with \
+        hits of lights by multiple importance sampling. It is the simplest method and the best one where light is \
+        easy to reach from what the camera sees.\n\n\
+        Kajiya 1986, \"The rendering equation\"; Veach 1997, \"Robust Monte Carlo methods for light transport \
+        simulation\", chapter 9 and section 10.2.",
+    params: &[&[MAX_DEPTH, RR_DEPTH_UNIDIRECTIONAL, HIDE_EMITTERS, heuristic("power")]],
     unbiased: true,
-    refuses: |_| None,
-    cannot: |_| None,
+    limitations: |_| None,
     build: |params| Box::new(PathTracer::new(params)),
 };
 

@@ -26,6 +26,7 @@ pub(in crate::integrators) mod near;
 mod combined;
 mod distributions;
 mod learnt;
+pub(in crate::integrators) mod params;
 mod pmfs;
 mod places;
 mod prepare;
@@ -33,165 +34,78 @@ pub(in crate::integrators) mod resampler;
 mod sites;
 pub(in crate::integrators) mod store;
 
-use super::bdpt::sizing;
-use super::bdpt::{Bidirectional, HIDE_EMITTERS, MAX_DEPTH, TECHNIQUES};
-use super::{IntegratorSpec, ParamDefault, ParamSpec, Params};
+use super::bdpt::Bidirectional;
+use super::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES};
+use super::{IntegratorSpec, ParamSpec, Params};
 use crate::mis::{Form, Heuristic};
 use crate::spatial::nearest::Metric;
 pub(in crate::integrators) use combined::{Draws, DrawsFrom};
 pub(in crate::integrators) use distributions::Distribution;
 pub(in crate::integrators) use resampler::Resampler;
 
-pub(in crate::integrators) const PATHS: ParamSpec = ParamSpec {
-    name: "paths",
-    about: "M, light sub-paths per iteration from which eye vertices draw",
-    default: ParamDefault::Int(200, 1, 10_000_000),
-};
-/// One of many connections is drawn: they need not be as many.
-pub(in crate::integrators) const RR_DEPTH: ParamSpec =
-    ParamSpec { default: ParamDefault::Int(1, 1, 1_000_000), ..super::bdpt::RR_DEPTH };
-pub(in crate::integrators) const KEEP: ParamSpec = ParamSpec {
-    name: "keep",
-    about: "percent of an eye sub-path's survival of Russian roulette on matt surfaces, where connections find all light: lower, more of them end early",
-    default: ParamDefault::Int(40, 1, 100),
-};
-const FIRST_STAGE: ParamSpec = ParamSpec {
-    name: "paths",
-    about: "M1, light sub-paths per iteration for the first stage; 0: as many as are worth their time beside the eye sub-paths",
-    default: ParamDefault::Int(0, 0, 10_000_000),
-};
-const SECOND_STAGE: ParamSpec = ParamSpec {
-    name: "second_stage",
-    about: "M2, light vertices that the first stage leaves to a group of cache points",
-    default: ParamDefault::Int(200, 1, 1_000_000),
-};
-pub(in crate::integrators) const SAMPLES: ParamSpec =
-    ParamSpec { name: "samples", about: "N, draws of each eye vertex", default: ParamDefault::Int(1, 1, 1024) };
-pub(in crate::integrators) const NEIGHBOURS: ParamSpec = ParamSpec {
-    name: "neighbours",
-    about: "cache points whose probabilities an eye vertex mixes",
-    default: ParamDefault::Int(3, 0, 3),
-};
-const CACHES: ParamSpec = ParamSpec {
-    name: "caches",
-    about: "eye sub-paths that make cache points, per 100 000 pixels",
-    default: ParamDefault::Int(400, 0, 100_000),
-};
-/// Groups share their first stage and have but few vertices to ask for: they may be denser.
-const GROUPED_CACHES: ParamSpec = ParamSpec { default: ParamDefault::Int(2000, 0, 100_000), ..CACHES };
-const EPSILON: ParamSpec = ParamSpec {
-    name: "epsilon",
-    about: "smallest ratio of densities p/q that weights use, in millionths",
-    default: ParamDefault::Int(1000, 1, 1_000_000),
-};
-const DOUBT: ParamSpec = ParamSpec {
-    name: "doubt",
-    about: "smallest share of light, in millionths, of which weights assume that the cache points around do not know it (proposals=mixture)",
-    default: ParamDefault::Int(20_000, 0, 1_000_000),
-};
-const TRUST: ParamSpec = ParamSpec {
-    name: "trust",
-    about: "what weights assume of cache points (proposals=mixture): learned: that they know as much of a place's light as they turned out to know of each other's; full: all of it, but for `doubt`",
-    default: ParamDefault::Choice("learned", &["learned", "full"]),
-};
-const METRIC: ParamSpec = ParamSpec {
-    name: "metric",
-    about: "the nearest cache points of a place are those on surfaces that face about the same way, or those of any surface (plain)",
-    default: ParamDefault::Choice("facing", &["facing", "plain"]),
-};
-const TARGET: ParamSpec = ParamSpec {
-    name: "target",
-    about: "what probabilities at a cache point are proportional to: irradiance, the light that a sub-path brings there; radiance, what of it the surface there sends back to the eye",
-    default: ParamDefault::Choice("irradiance", &["irradiance", "radiance"]),
-};
-/// By measurement: where cache points are few it is worth to weigh each by itself; where they are dense, their mixture is the better one, and
-/// to ask them costs as much as it gains but for the rare and bright samples that it spares.
-const fn proposals(default: &'static str) -> ParamSpec {
-    ParamSpec {
-        name: "proposals",
-        about: "mixture: eye vertices draw from one mixture of the probabilities around and a uniform share, of which weights assume that they are those of the place itself; asked: the same, but weights ask the cache points around what these see; split: each of these probabilities is a technique with a weight of its own, as published (asked and split take metric=plain, split target=irradiance; all that weights=balance knows is the mixture)",
-        default: ParamDefault::Choice(default, &["mixture", "asked", "split"]),
-    }
-}
-const SKIP: ParamSpec = sizing::parameter("auto");
-const fn weights(default: &'static str, choices: &'static [&'static str]) -> ParamSpec {
-    ParamSpec {
-        name: "weights",
-        about: "what weights know: balance: nothing of resampling; ris: that one of many is drawn; two-stage: that it is drawn in two stages",
-        default: ParamDefault::Choice(default, choices),
-    }
-}
-
-/// The parameters of methods with one stage; they differ in the weights they take by default.
-const fn one_stage(default_weights: &'static str) -> [ParamSpec; 17] {
-    let weights = weights(default_weights, &["balance", "ris"]);
-    [
-        MAX_DEPTH,
-        RR_DEPTH,
-        KEEP,
-        HIDE_EMITTERS,
-        TECHNIQUES,
-        PATHS,
-        SAMPLES,
-        NEIGHBOURS,
-        CACHES,
-        METRIC,
-        TARGET,
-        proposals("split"),
-        EPSILON,
-        DOUBT,
-        TRUST,
-        weights,
-        SKIP,
-    ]
-}
-
-const PCBPT_PARAMS: [ParamSpec; 17] = one_stage("balance");
-const RIS_PARAMS: [ParamSpec; 17] = one_stage("ris");
-const TWO_STAGE_PARAMS: [ParamSpec; 18] = [
+/// Parameters of methods with one stage, up to the weights; the latter differ in their default.
+const ONE_STAGE: &[ParamSpec] = &[
     MAX_DEPTH,
-    RR_DEPTH,
-    KEEP,
+    RR_DEPTH_RESAMPLED,
+    params::RR_SCALE,
     HIDE_EMITTERS,
     TECHNIQUES,
-    FIRST_STAGE,
-    SECOND_STAGE,
-    SAMPLES,
-    NEIGHBOURS,
-    GROUPED_CACHES,
-    METRIC,
-    TARGET,
-    proposals("asked"),
-    EPSILON,
-    DOUBT,
-    TRUST,
-    weights("two-stage", &["balance", "ris", "two-stage"]),
-    SKIP,
+    params::PRESAMPLED_PATHS,
+    params::CONNECTIONS_PER_VERTEX,
+    params::NEAREST_CACHES,
+    params::CACHE_DENSITY,
+    params::METRIC,
+    params::TARGET,
+    params::proposal_model("per-cache"),
+    params::MIN_DENSITY_RATIO,
+    params::MIN_UNSEEN_FRACTION,
+    params::UNSEEN_MODEL,
 ];
 
-fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Integrator> {
+const TWO_STAGES: &[ParamSpec] = &[
+    MAX_DEPTH,
+    RR_DEPTH_RESAMPLED,
+    params::RR_SCALE,
+    HIDE_EMITTERS,
+    TECHNIQUES,
+    params::FIRST_STAGE_PATHS,
+    params::SECOND_STAGE_PATHS,
+    params::CONNECTIONS_PER_VERTEX,
+    params::NEAREST_CACHES,
+    params::GROUPED_CACHE_DENSITY,
+    params::METRIC,
+    params::TARGET,
+    params::proposal_model("mixture-with-visibility"),
+    params::MIN_DENSITY_RATIO,
+    params::MIN_UNSEEN_FRACTION,
+    params::UNSEEN_MODEL,
+    params::TWO_STAGE_WEIGHTS,
+    ALLOCATION,
+];
+
+fn build_with(params: &Params, paths: u32, second_stage: Option<u32>) -> Box<dyn super::Integrator> {
     let weights = match params.choice("weights") {
         "balance" => Weights::Balance,
-        "ris" => Weights::OneStage,
+        "resampling-aware" => Weights::OneStage,
         _ => Weights::TwoStage,
     };
-    let form = match params.choice("proposals") {
-        "asked" if weights != Weights::Balance => Form::Asked,
-        "split" if weights != Weights::Balance => Form::Split,
+    let form = match params.choice("proposal_model") {
+        "mixture-with-visibility" if weights != Weights::Balance => Form::Asked,
+        "per-cache" if weights != Weights::Balance => Form::Split,
         _ => Form::Mixture,
     };
     let settings = Settings {
         scheme: Scheme::Caches,
-        paths: params.int("paths") as u32,
+        paths,
         second_stage,
-        samples: params.int("samples") as u32,
-        neighbours: params.int("neighbours") as usize,
-        cache_fraction: params.int("caches") as f64 * 1e-5,
-        epsilon: params.int("epsilon") as f32 * 1e-6,
-        doubt: params.int("doubt") as f32 * 1e-6,
-        trust: params.choice("trust") == "full",
+        samples: params.int("connections_per_vertex") as u32,
+        neighbours: params.int("nearest_caches") as usize,
+        cache_fraction: params.float("cache_density"),
+        epsilon: params.float("min_density_ratio") as f32,
+        doubt: params.float("min_unseen_fraction") as f32,
+        trust: params.choice("unseen_model") == "constant",
         // Which cache points a weight asks must be the same from whichever side a technique looks at a surface.
-        metric: if params.choice("metric") == "plain" || form.asks() { Metric::Plain } else { Metric::Facing },
+        metric: if params.choice("metric") == "position" || form.asks() { Metric::Plain } else { Metric::Facing },
         radiance: params.choice("target") == "radiance" && form != Form::Split,
         form,
         weights,
@@ -202,27 +116,32 @@ fn build_with(params: &Params, second_stage: Option<u32>) -> Box<dyn super::Inte
 /// An integrator with the parameters that all methods of this kind have.
 pub(in crate::integrators) fn build_resampled(params: &Params, settings: Settings) -> Box<dyn super::Integrator> {
     let mut this = Bidirectional::new(params, Heuristic::Balance, params.techniques("techniques"));
-    this.weigher.eye_limits.keep = params.int("keep") as f32 * 0.01;
+    // By way of percent, so that the rounding is that of checkpoints and pictures that exist.
+    this.weigher.eye_limits.keep = (params.float("rr_scale") * 100.0) as f32 * 0.01;
     this.resample(settings);
-    if params.choice("skip") == "auto" {
+    if params.choice("allocation") == "auto" {
         this.size_by_scene();
     }
     Box::new(this)
 }
 
 fn build(params: &Params) -> Box<dyn super::Integrator> {
-    build_with(params, None)
+    build_with(params, params.int("presampled_paths") as u32, None)
 }
 
 /// The registry's line of `pcbpt`.
 pub static PCBPT: IntegratorSpec = IntegratorSpec {
     name: "pcbpt",
     aliases: &[],
-    about: "Probabilistic connections: eye vertices draw from many light sub-paths by what these bring to nearby cache points; weights of bidirectional path tracing",
-    params: &PCBPT_PARAMS,
+    short: "Probabilistic connections (PCBPT): bidirectional, connections are resampled",
+    long: "Many light sub-paths are traced in every iteration. Each eye vertex is connected to one of their \
+        vertices, drawn by the contributions that light sub-paths make at nearby cache points. Weights are those of \
+        bidirectional path tracing, which ignore resampling; `ris` is the same method with better weights.\n\n\
+        Popov, Ramamoorthi, Durand and Drettakis 2015, \"Probabilistic connections for bidirectional path tracing\". \
+        As published: rr_scale=1, allocation=full.",
+    params: &[ONE_STAGE, &[params::weights("balance"), ALLOCATION]],
     unbiased: true,
-    refuses: |_| None,
-    cannot: |_| None,
+    limitations: |_| None,
     build,
 };
 
@@ -230,11 +149,14 @@ pub static PCBPT: IntegratorSpec = IntegratorSpec {
 pub static RIS: IntegratorSpec = IntegratorSpec {
     name: "ris",
     aliases: &["risbpt"],
-    about: "Resampled connections with resampling-aware weights (RISBPT): as pcbpt, with weights that know the density which resampling makes",
-    params: &RIS_PARAMS,
+    short: "Resampled connections with resampling-aware weights (RISBPT)",
+    long: "As `pcbpt`, with weights that take the density of resampled connections into account, so that these get \
+        the light they are good at. It is for interiors lit by way of other rooms or through gaps.\n\n\
+        Nabata, Iwasaki and Dobashi 2020, \"Resampling-aware weighting functions for bidirectional path tracing \
+        using multiple light sub-paths\". As published: rr_scale=1, allocation=full.",
+    params: &[ONE_STAGE, &[params::weights("resampling-aware"), ALLOCATION]],
     unbiased: true,
-    refuses: |_| None,
-    cannot: |_| None,
+    limitations: |_| None,
     build,
 };
 
@@ -242,12 +164,21 @@ pub static RIS: IntegratorSpec = IntegratorSpec {
 pub static TWO_STAGE: IntegratorSpec = IntegratorSpec {
     name: "two-stage",
     aliases: &["tsr"],
-    about: "Two-stage resampled connections: as ris, from very many light sub-paths, of which cache points ask for few",
-    params: &TWO_STAGE_PARAMS,
+    short: "Resampled connections in two stages, from very many light sub-paths",
+    long: "As `ris`, from many more light sub-paths: a first stage, which ignores visibility and needs no shadow \
+        rays, leaves few of them to each group of cache points; a second stage resamples those with visibility. It \
+        is the first choice for interiors that are hard to light.\n\n\
+        Nabata, Iwasaki and Dobashi 2020, \"Two-stage resampling for bidirectional path tracing with multiple light \
+        sub-paths\". As published: rr_scale=1, allocation=full, proposal_model=per-cache, presampled_paths=10000, \
+        cache_density=0.4%.",
+    params: &[TWO_STAGES],
     unbiased: true,
-    refuses: |_| None,
-    cannot: |_| None,
-    build: |params| build_with(params, Some(params.int("second_stage") as u32)),
+    limitations: |_| None,
+    build: |params| {
+        // Zero is decided by the scene.
+        let paths = params.auto_int("presampled_paths").unwrap_or(0) as u32;
+        build_with(params, paths, Some(params.int("second_stage_paths") as u32))
+    },
 };
 
 /// What weights know of resampling.

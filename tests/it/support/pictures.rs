@@ -45,7 +45,7 @@ pub fn prepare(desc: SceneDesc, backend: Backend, crop: Option<[u32; 4]>) -> Pre
 
 /// True if the integrator is made for such scenes, and renders all of them.
 pub fn takes(spec: &IntegratorSpec, scene: &PreparedScene) -> bool {
-    (spec.refuses)(scene.features).is_none() && (spec.cannot)(scene.features).is_none()
+    (spec.limitations)(scene.features).is_none()
 }
 
 /// Means per pixel and channel with the variances of these means.
@@ -75,9 +75,11 @@ impl Picture {
         // Few samples of few pixels show no variance of what is rare: splats of a small share of the light image, and long eye sub-paths
         // that end early. Tests that want these ask for them. And few pixels need few light sub-paths, a small scene no fine voxels.
         for (name, value) in
-            [("skip", "never"), ("keep", "100"), ("cells", "24"), ("paths", "100")].iter().chain(params)
+            [("allocation", "full"), ("rr_scale", "1"), ("voxel_resolution", "24"), ("presampled_paths", "100")]
+                .iter()
+                .chain(params)
         {
-            if spec.params.iter().any(|p| p.name == *name) {
+            if spec.params().any(|p| p.name == *name) {
                 values.set(name, value).unwrap();
             }
         }
