@@ -3,7 +3,7 @@
 //! The library is a row of rooms; each imports only rooms that stand before it in this list (a test enforces it):
 //!
 //! ```text
-//! math → image → scene → load → ray → shade → emit → prepared → spatial → path → mis → film → integrators → render → measure → app
+//! math → image → scene → load → ray → shade → emit → prepared → spatial → path → mis → film → bidir → integrators → render → measure → app
 //! ```
 //!
 //! Data flows one way and can be read in `render::driver`:
@@ -29,6 +29,7 @@ pub mod spatial;
 pub mod path;
 pub mod mis;
 pub mod film;
+pub mod bidir;
 pub mod integrators;
 pub mod render;
 pub mod measure;

@@ -17,7 +17,8 @@ scenes=${SCENES:-door cornell colonnade caustic many-lamps bedroom}
 spp=${SPP:-8}
 size=${SIZE:-96x54}
 scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
+lens=
+trap 'rm -rf "$scratch" ${lens:+"$lens"}' EXIT
 kept=${OUT:-$scratch/old}
 mkdir -p "$kept" "$scratch/new"
 
@@ -32,13 +33,13 @@ fi
 compared=0
 differing=0
 
-# picture FILE ARGUMENTS...: renders the picture FILE with both programs and compares the two.
+# picture NAME ARGUMENTS...: renders the picture NAME with both programs and compares the two.
 picture() {
-    file=$1
+    name=$1
     shift
-    [ -s "$kept/$file" ] || "$old" render "$@" --size "$size" --quiet -o "$kept/$file" || exit 2
-    "$new" render "$@" --size "$size" --quiet -o "$scratch/new/$file" || exit 2
-    judge "$file"
+    [ -s "$kept/$name" ] || "$old" render "$@" --size "$size" --quiet -o "$kept/$name" || exit 2
+    "$new" render "$@" --size "$size" --quiet -o "$scratch/new/$name" || exit 2
+    judge "$name"
 }
 
 judge() {
@@ -71,7 +72,6 @@ done
 lens=${first%.xml}-thin-lens-$$.xml
 sed -e 's/type="perspective"/type="thinlens"/' -e '/type="thinlens"/a\
 <float name="aperture_radius" value="0.05"/><float name="focus_distance" value="3"/>' "$first" >"$lens"
-trap 'rm -rf "$scratch" "$lens"' EXIT
 for integrator in $integrators; do
     picture "crop-$integrator.pfm" "$first" -i "$integrator" --spp "$spp" --crop 17,9,40,30
     picture "thin-lens-$integrator.pfm" "$lens" -i "$integrator" --spp "$spp"

@@ -5,7 +5,7 @@ use super::cli::{Query, ReplayArgs};
 use super::config::Config;
 use super::report;
 use crate::integrators::Iteration;
-use crate::integrators::replay::{Contribution, Replay, VertexRecord};
+use crate::integrators::replay::{ContributionRecord as Contribution, Replay, VertexRecord};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::prepared::{PrepareOptions, PreparedScene};
 use crate::scene::Diagnostics;

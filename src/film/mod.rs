@@ -46,6 +46,11 @@ pub struct Film {
     iterations: u64,
 }
 
+/// Number of tiles of a film for a part of the picture: x, y, width, height.
+pub fn tile_count([_, _, width, height]: [u32; 4]) -> usize {
+    width.div_ceil(TILE) as usize * height.div_ceil(TILE) as usize
+}
+
 impl Film {
     /// An empty film for a part of the picture: x, y, width, height.
     pub fn new([x0, y0, width, height]: [u32; 4]) -> Film {

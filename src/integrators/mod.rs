@@ -3,18 +3,19 @@
 //! Parameters, help texts, refusals and the tests that run over every integrator come from [`REGISTRY`], never from a second list.
 
 pub mod bdpt;
+pub mod bidirectional;
 pub mod importance;
 pub mod light;
 pub mod params;
 pub mod path;
-pub mod replay;
 pub mod resampling;
 
+pub use crate::bidir::replay::{self, Replay};
+pub use crate::path::Iteration;
 pub use params::{ParamDefault, ParamError, ParamSpec, Params, Renamed};
-pub use replay::Replay;
 
 use crate::film::{Film, Pyramid};
-use crate::prepared::{Features, PreparedScene};
+use crate::prepared::Features;
 use crate::ray::RayStats;
 
 /// Every integrator, by name.
@@ -60,17 +61,6 @@ impl IntegratorSpec {
 /// The integrator of that name or alias.
 pub fn find(name: &str) -> Option<&'static IntegratorSpec> {
     REGISTRY.iter().find(|s| s.name == name || s.aliases.contains(&name)).copied()
-}
-
-/// One iteration's orders.
-#[derive(Clone, Copy)]
-pub struct Iteration<'a> {
-    /// The scene.
-    pub scene: &'a PreparedScene,
-    /// Seed of the render.
-    pub seed: u64,
-    /// Number of the iteration, from zero.
-    pub index: u64,
 }
 
 /// A rendering algorithm at work.

@@ -1,7 +1,8 @@
-//! A whole path, seen from neither end: v_0 on a light, v_1 … v_{k−1} on surfaces, v_k on the lens.
+//! A whole path, seen from neither end: v_0 on a light, v_1 … v_{k−1} between, v_k on the lens.
 //!
-//! Renders never need it. It is what slow definitions are written for, in tests and where a single sample is explained.
+//! Renders never need it. Slow definitions are written for it, in tests and where a single sample is explained.
 
+use super::vertex::{Scatter, StoredPlace};
 use crate::emit::{LightEnd, LightId};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::shade::{Bsdf, SurfacePoint};
@@ -13,11 +14,23 @@ pub struct Interior {
     pub point: SurfacePoint,
     /// The BSDF there, resolved for either of the two directions of the path.
     pub bsdf: Bsdf,
-    /// See [`SurfaceVertex::light_normal`](super::SurfaceVertex).
-    pub light_normal: Option<Vec3>,
-    /// Of a delta event: the discrete probabilities of going on towards the lens when coming from the light, and the reverse; and what
-    /// it leaves of light that goes on towards the lens.
+    /// The normal that the choice of a light may use here.
+    pub light_choice_normal: Option<Vec3>,
+    /// Of a delta event: the discrete probabilities of going on towards the lens when coming from the light, and the reverse; and the
+    /// value for light that goes on towards the lens.
     pub delta: Option<([SolidAnglePdf; 2], Rgb)>,
+}
+
+impl Interior {
+    /// The scattering function.
+    pub fn scatter(&self) -> Scatter<'_> {
+        Scatter::Bsdf(&self.bsdf)
+    }
+
+    /// The place.
+    pub fn place(&self) -> StoredPlace {
+        StoredPlace::Surface { p: self.point.p, error: self.point.error, ng: self.point.ng }
+    }
 }
 
 /// The light's end of a path.
@@ -28,10 +41,9 @@ pub struct Origin {
     /// v_0.
     pub end: LightEnd,
     /// Unit direction that leaves v_0.
-    pub leaving: Vec3,
-    /// What a light sub-path that begins like this carries to v_1: emission and its cosine over the densities of v_0 and of the
-    /// direction.
-    pub flux: Rgb,
+    pub direction: Vec3,
+    /// β_L at v_1 of a light sub-path that begins like this: emission and its cosine over the densities of v_0 and of the direction.
+    pub throughput: Rgb,
 }
 
 /// A path of k edges.
@@ -71,7 +83,7 @@ impl FullPath {
                 let length = d.length();
                 (d / length, length)
             }
-            _ => (self.origin.leaving, f32::INFINITY),
+            _ => (self.origin.direction, f32::INFINITY),
         }
     }
 }

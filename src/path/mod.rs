@@ -1,13 +1,20 @@
-//! Paths: vertices, the one random walk, and shadow rays on their way.
+//! Paths: vertices, the one random walk, and visibility rays on their way.
 //!
 //! Integrators never write a bounce loop: they give [`walk()`] an origin and hooks.
 
+pub mod directions;
 pub mod full;
-pub mod shadow;
+pub mod iteration;
+pub mod roulette;
+pub mod streams;
 pub mod vertex;
+pub mod visibility;
 pub mod walk;
 
+pub use directions::{DirectionSampler, ScatterSampler};
 pub use full::{FullPath, Interior, Origin};
-pub use shadow::{ShadowQueue, direct_segment};
-pub use vertex::{Edge, SurfaceVertex};
-pub use walk::{Limits, WalkHooks, WalkStart, walk};
+pub use iteration::Iteration;
+pub use roulette::PathLimits;
+pub use vertex::{Edge, Place, Scatter, Scattering, StoredPlace, Vertex};
+pub use visibility::{ShadowQueue, Transmittance, direct_segment};
+pub use walk::{CameraStart, WalkHooks, WalkRules, WalkStart, walk};

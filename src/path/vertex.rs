@@ -1,19 +1,19 @@
-//! A vertex of a sub-path.
+//! A vertex of a sub-path: a place, and a function that scatters light there.
 
+use crate::math::measure::spread;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::ray::Hit;
-use crate::shade::{Bsdf, SurfacePoint};
+use crate::ray::offset::SegmentEnd;
+use crate::shade::{Bsdf, BsdfRef, BsdfSample, MediumPoint, Phase, SurfacePoint, Transport};
 
 /// How a vertex was reached.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
-    /// Where the walk was before (a lens point, a light's point, a surface).
+    /// The vertex before: a lens point, a point of a light, a vertex of the walk.
     pub from: Vec3,
-    /// Shading normal of the vertex before, if it was on a surface that reflects only (light choice may use it).
-    pub from_normal: Option<Vec3>,
     /// Density per steradian with which the direction was drawn; of a delta event its discrete probability.
     pub pdf: SolidAnglePdf,
-    /// The direction was drawn from a delta lobe (or through a pinhole): no other technique finds this edge.
+    /// The direction was drawn from a delta lobe: no other technique finds this edge.
     pub delta: bool,
     /// Probability with which Russian roulette let the walk go on into this edge.
     pub survival: f32,
@@ -21,24 +21,272 @@ pub struct Edge {
     pub distance: f32,
 }
 
-/// A vertex on a surface, as hooks see it: what is large is borrowed from the walk, which makes it in place.
+impl Edge {
+    /// Density per steradian of the direction, survival of Russian roulette included.
+    #[inline]
+    pub fn pdf_with_survival(&self) -> SolidAnglePdf {
+        SolidAnglePdf(self.pdf.0 * self.survival)
+    }
+}
+
+/// Where a vertex is.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfaceVertex<'a> {
-    /// Number of the vertex, counted from the sub-path's origin: the first hit is 1.
+pub enum Place<'a> {
+    /// On a surface.
+    Surface {
+        /// The point.
+        point: &'a SurfacePoint,
+        /// The ray query's answer.
+        hit: &'a Hit,
+    },
+    /// Inside a participating medium.
+    Medium(&'a MediumPoint),
+}
+
+/// A place that outlives the walk that found it.
+#[derive(Clone, Copy, Debug)]
+pub enum StoredPlace {
+    /// On a surface.
+    Surface {
+        /// Position.
+        p: Vec3,
+        /// Bound on the error of any component of `p`.
+        error: f32,
+        /// Unit geometric normal.
+        ng: Vec3,
+    },
+    /// Inside a participating medium.
+    Medium(MediumPoint),
+}
+
+impl StoredPlace {
+    /// Position.
+    #[inline]
+    pub fn position(&self) -> Vec3 {
+        match *self {
+            StoredPlace::Surface { p, .. } => p,
+            StoredPlace::Medium(medium) => match medium {},
+        }
+    }
+
+    /// Cosine between the unit direction `d` and the geometric normal, the factor of a geometry term at this end of an edge; 1 in a medium.
+    #[inline]
+    pub fn cosine(&self, d: Vec3) -> f32 {
+        match self {
+            StoredPlace::Surface { ng, .. } => ng.dot(d),
+            StoredPlace::Medium(medium) => match *medium {},
+        }
+    }
+
+    /// Turns a density per steradian at a point a distance √`distance2` away in the unit direction `d` into the density per unit area (in a
+    /// medium: volume) of this place: |cos| / d² on a surface, 1 / d² in a medium (Veach 1997, eq. 8.8).
+    #[inline]
+    pub fn area_jacobian(&self, d: Vec3, distance2: f32) -> f32 {
+        spread(self.cosine(d), distance2)
+    }
+
+    /// The geometric normal on the side of the direction `d`.
+    #[inline]
+    pub fn side_normal(&self, d: Vec3) -> Vec3 {
+        match *self {
+            StoredPlace::Surface { ng, .. } => {
+                if ng.dot(d) < 0.0 {
+                    -ng
+                } else {
+                    ng
+                }
+            }
+            StoredPlace::Medium(medium) => match medium {},
+        }
+    }
+
+    /// Distance of a point at the given offset from the place's tangent plane, and the bound on the error of the place's own coordinates:
+    /// a point within the errors of both is on neither side. `None` in a medium, which has no plane.
+    #[inline]
+    pub fn height(&self, offset: Vec3) -> Option<(f32, f32)> {
+        match *self {
+            StoredPlace::Surface { error, ng, .. } => Some((ng.dot(offset).abs(), error)),
+            StoredPlace::Medium(medium) => match medium {},
+        }
+    }
+
+    /// This end of a segment.
+    #[inline]
+    pub fn segment_end(&self) -> SegmentEnd {
+        match *self {
+            StoredPlace::Surface { p, error, ng } => SegmentEnd::Surface { p, error, ng },
+            StoredPlace::Medium(medium) => match medium {},
+        }
+    }
+}
+
+impl Place<'_> {
+    /// The parts of the place that outlive the walk.
+    #[inline]
+    pub fn stored(&self) -> StoredPlace {
+        match self {
+            Place::Surface { point, .. } => StoredPlace::Surface { p: point.p, error: point.error, ng: point.ng },
+            Place::Medium(medium) => match **medium {},
+        }
+    }
+
+    /// Position.
+    #[inline]
+    pub fn position(&self) -> Vec3 {
+        self.stored().position()
+    }
+
+    /// See [`StoredPlace::cosine`].
+    #[inline]
+    pub fn cosine(&self, d: Vec3) -> f32 {
+        self.stored().cosine(d)
+    }
+
+    /// See [`StoredPlace::area_jacobian`].
+    #[inline]
+    pub fn area_jacobian(&self, d: Vec3, distance2: f32) -> f32 {
+        self.stored().area_jacobian(d, distance2)
+    }
+
+    /// This end of a segment.
+    #[inline]
+    pub fn segment_end(&self) -> SegmentEnd {
+        self.stored().segment_end()
+    }
+}
+
+/// A scattering function at a place. Values are cosine weighted on surfaces.
+pub trait Scattering {
+    /// Value for light that comes along `wi` and leaves along `wo` (`Transport::Importance`: the adjoint).
+    fn eval(&self, wo: Vec3, wi: Vec3, mode: Transport) -> Rgb;
+
+    /// Density per steradian with which [`Scatter::sample`] draws `wi` given `wo`.
+    fn pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> SolidAnglePdf;
+
+    /// [`Scattering::eval`] and [`Scattering::pdf`].
+    fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf);
+}
+
+macro_rules! scattering {
+    ($($type:ty),*) => { $(
+        impl Scattering for $type {
+            #[inline]
+            fn eval(&self, wo: Vec3, wi: Vec3, mode: Transport) -> Rgb {
+                <$type>::eval(self, wo, wi, mode)
+            }
+
+            #[inline]
+            fn pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> SolidAnglePdf {
+                <$type>::pdf(self, wo, wi, mode)
+            }
+
+            #[inline]
+            fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
+                <$type>::eval_and_pdf(self, wo, wi, mode)
+            }
+        }
+    )* };
+}
+
+scattering!(Bsdf, BsdfRef<'_>);
+
+/// The scattering function of a vertex that a walk has just made.
+#[derive(Clone, Copy, Debug)]
+pub enum Scatter<'a> {
+    /// Of a surface.
+    Bsdf(&'a Bsdf),
+    /// Of a medium.
+    Phase(&'a Phase),
+}
+
+impl<'a> Scatter<'a> {
+    /// The BSDF of a surface vertex.
+    #[inline]
+    pub fn bsdf(&self) -> &'a Bsdf {
+        match *self {
+            Scatter::Bsdf(bsdf) => bsdf,
+            Scatter::Phase(phase) => match *phase {},
+        }
+    }
+
+    /// Draws a direction; `u` are three numbers in [0, 1).
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
+        self.bsdf().sample(wo, u, mode)
+    }
+
+    /// Approximate share of light that is scattered, per channel, independent of direction.
+    #[inline]
+    pub fn albedo(&self) -> Rgb {
+        self.bsdf().albedo()
+    }
+
+    /// No light is scattered.
+    #[inline]
+    pub fn is_black(&self) -> bool {
+        self.bsdf().is_black()
+    }
+
+    /// A connection to this vertex can carry light: not every event is a delta event.
+    #[inline]
+    pub fn connectable(&self) -> bool {
+        self.bsdf().connectable()
+    }
+
+    /// Light is scattered as by a Lambertian surface and in no other way.
+    #[inline]
+    pub fn is_lambertian(&self) -> bool {
+        self.bsdf().is_lambertian()
+    }
+}
+
+impl Scattering for Scatter<'_> {
+    #[inline]
+    fn eval(&self, wo: Vec3, wi: Vec3, mode: Transport) -> Rgb {
+        self.bsdf().eval(wo, wi, mode)
+    }
+
+    #[inline]
+    fn pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> SolidAnglePdf {
+        self.bsdf().pdf(wo, wi, mode)
+    }
+
+    #[inline]
+    fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
+        self.bsdf().eval_and_pdf(wo, wi, mode)
+    }
+}
+
+/// A vertex as hooks see it: what is large is borrowed from the walk, which makes it in place.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex<'a> {
+    /// Number of the vertex, counted from the sub-path's origin: the first vertex after the origin is 1.
     pub index: u32,
-    /// What was hit.
-    pub hit: &'a Hit,
-    /// The point.
-    pub point: &'a SurfacePoint,
-    /// The BSDF there, seen from `wo`.
-    pub bsdf: &'a Bsdf,
+    /// Where it is.
+    pub place: Place<'a>,
+    /// The scattering function there, resolved for `wo`.
+    pub scatter: Scatter<'a>,
     /// Unit direction back to the vertex before.
     pub wo: Vec3,
-    /// Throughput up to this vertex: everything of the measurement contribution that the walk has passed, divided by its density.
+    /// Throughput up to this vertex: all factors of the measurement contribution that the walk has passed, divided by its density.
     pub throughput: Rgb,
     /// How it was reached.
     pub edge: &'a Edge,
-    /// Normal that the choice of a light may use here: none where light from behind contributes, or where the scene's choice
-    /// does not depend on the place.
-    pub light_normal: Option<Vec3>,
+}
+
+impl Vertex<'_> {
+    /// Position.
+    #[inline]
+    pub fn position(&self) -> Vec3 {
+        self.place.position()
+    }
+
+    /// The normal that the choice of a light may use here: the shading normal on the side of `wo`, none where light from behind
+    /// contributes.
+    #[inline]
+    pub fn light_choice_normal(&self) -> Option<Vec3> {
+        let Place::Surface { point, .. } = self.place else { return None };
+        let n = point.frame.n;
+        (!self.scatter.bsdf().transmits()).then(|| if n.dot(self.wo) < 0.0 { -n } else { n })
+    }
 }

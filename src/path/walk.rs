@@ -1,14 +1,14 @@
 //! The random walk: the only bounce loop of the program.
 //!
-//! From an origin it traces, resolves the surface, shows the vertex to the hooks, draws the next direction from the BSDF and plays Russian
-//! roulette, until a limit, a miss or a hook ends it. Whether it carries radiance or importance is [`Transport`]'s to say.
-//!
-//! Russian roulette starts at a vertex index counted from the sub-path's own origin and survives with a probability that depends on
-//! the vertex alone (its albedo, not the throughput), so that the density of a path is known from either of its ends.
+//! From an origin it traces, resolves the vertex, shows it to the hooks, draws the next direction from the direction sampler and plays
+//! Russian roulette, until a limit, a miss or a hook ends it. [`Transport`] says whether it carries radiance or importance.
 
-use super::vertex::{Edge, SurfaceVertex};
+use super::directions::DirectionSampler;
+use super::iteration::Iteration;
+use super::roulette::PathLimits;
+use super::vertex::{Edge, Place, Scatter, Vertex};
 use crate::math::sampler::{PathSampler, Purpose};
-use crate::math::{Rgb, SolidAnglePdf, Vec3};
+use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 use crate::prepared::PreparedScene;
 use crate::ray::{Ray, RayKind, T_MIN, Tracer, offset::offset_point};
 use crate::shade::{Bsdf, BsdfSample, SurfacePoint, Transport};
@@ -22,73 +22,85 @@ pub struct WalkStart {
     pub throughput: Rgb,
     /// Density per steradian of its direction.
     pub pdf: SolidAnglePdf,
-    /// The first ray comes from an origin that no other technique meets.
-    pub delta: bool,
-    /// What the first ray counts as.
+    /// Statistics count the first ray as this kind.
     pub kind: RayKind,
 }
 
-/// How long a walk may be.
+/// The start of a walk from the lens.
 #[derive(Clone, Copy, Debug)]
-pub struct Limits {
-    /// Largest number of edges of the sub-path.
-    pub max_edges: u32,
-    /// Vertex index from which Russian roulette is played; the first hit is 1.
-    pub roulette_from: u32,
-    /// Where roulette is played and the vertex is matt, survival is lower by this factor.
-    pub keep: f32,
+pub struct CameraStart {
+    /// The walk.
+    pub walk: WalkStart,
+    /// Density of the lens point per unit area.
+    pub lens_pdf: AreaPdf,
 }
 
-/// Survival probability of Russian roulette never exceeds this, so that walks between white mirrors end.
-const MAX_SURVIVAL: f32 = 0.95;
-
-/// Probability to go on after a vertex with the BSDF `bsdf` where roulette is played: the same from either end of the path.
-#[inline]
-fn survival(bsdf: &Bsdf) -> f32 {
-    bsdf.albedo().max_component().min(MAX_SURVIVAL)
-}
-
-impl Limits {
-    /// Probability to go on after vertex `index` with the BSDF `bsdf`; a function of the vertex alone.
+impl WalkStart {
+    /// Draws the camera ray of a sample of the pixel (x, y): a point of the pixel's filter and a point of the lens, by the first four
+    /// numbers of `sampler`. The throughput is the filter's weight.
     #[inline]
-    pub fn survival(&self, index: u32, bsdf: &Bsdf) -> f32 {
-        if index < self.roulette_from { 1.0 } else { self.roulette(bsdf) }
+    pub fn from_camera(iteration: &Iteration, (x, y): (u32, u32), sampler: &mut PathSampler) -> CameraStart {
+        let scene = iteration.scene;
+        let u = sampler.origin();
+        let (offset, filter) = scene.filter.sample([u[0], u[1]]);
+        let raster = [x as f32 + 0.5 + offset[0], y as f32 + 0.5 + offset[1]];
+        WalkStart::from_lens(scene, raster, [u[2], u[3]], Rgb::grey(filter), RayKind::Camera)
     }
 
-    /// The same at a vertex where roulette is played.
+    /// Draws the camera ray through the point `raster` of the film (in pixels) and the point of the lens that `u` says.
     #[inline]
-    pub fn roulette(&self, bsdf: &Bsdf) -> f32 {
-        let survival = survival(bsdf);
-        if self.keep < 1.0 && bsdf.is_lambertian() { survival * self.keep } else { survival }
+    pub fn from_lens(
+        scene: &PreparedScene,
+        raster: [f32; 2],
+        u: [f32; 2],
+        throughput: Rgb,
+        kind: RayKind,
+    ) -> CameraStart {
+        let eye = scene.camera.sample_ray(raster, u);
+        let (lens_pdf, pdf) = scene.camera.pdf_sampled_ray(eye.direction);
+        let ray = Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far };
+        CameraStart { walk: WalkStart { ray, throughput, pdf, kind }, lens_pdf }
     }
 }
 
 /// What an integrator does on the way.
 pub trait WalkHooks {
-    /// A surface was met. Returns whether to go on.
-    fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool;
+    /// A vertex was met. Returns whether to go on.
+    fn vertex(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool;
 
     /// The walk goes on from the vertex in a drawn direction, roulette survived.
     #[inline]
-    fn leaving(&mut self, _vertex: &SurfaceVertex, _sample: &BsdfSample) {}
+    fn leaving(&mut self, _vertex: &Vertex, _sample: &BsdfSample) {}
 
-    /// The ray left the scene in the direction `direction`; `throughput` and `edge` as for a vertex that would be there.
+    /// The ray left the scene in the unit direction `direction`; `throughput` and `edge` as for a vertex that would be there.
     fn escaped(&mut self, index: u32, direction: Vec3, throughput: Rgb, edge: &Edge);
 }
 
+/// The rules of a walk.
+#[derive(Clone, Copy, Debug)]
+pub struct WalkRules<'a, D> {
+    /// How long it may be.
+    pub limits: PathLimits,
+    /// Which quantity it carries.
+    pub mode: Transport,
+    /// Where it goes on.
+    pub directions: &'a D,
+}
+
 /// Walks; see the module's head.
-pub fn walk<H: WalkHooks>(
+#[inline]
+pub fn walk<H: WalkHooks, D: DirectionSampler>(
     scene: &PreparedScene,
     start: WalkStart,
-    limits: &Limits,
-    mode: Transport,
+    rules: &WalkRules<D>,
     tracer: &mut Tracer,
     sampler: &mut PathSampler,
     hooks: &mut H,
 ) {
-    let WalkStart { ray, mut throughput, pdf, delta, mut kind } = start;
+    let WalkStart { ray, mut throughput, pdf, mut kind } = start;
+    let WalkRules { limits, mode, directions } = *rules;
     let Ray { mut o, mut d, mut t_min, mut t_max } = ray;
-    let mut edge = Edge { from: o, from_normal: None, pdf, delta, survival: 1.0, distance: f32::INFINITY };
+    let mut edge = Edge { from: o, pdf, delta: false, survival: 1.0, distance: f32::INFINITY };
     let mut point = SurfacePoint::default();
     let mut bsdf = Bsdf::empty(&point);
     for index in 1..=limits.max_edges {
@@ -100,16 +112,15 @@ pub fn walk<H: WalkHooks>(
         let wo = -d;
         let material = scene.surface_point_into(&hit, &mut point);
         material.resolve_into(&mut bsdf, &point, wo);
-        let light_normal = if scene.lights.choice_depends_on_place() { light_normal(&point, &bsdf, wo) } else { None };
-        let vertex =
-            SurfaceVertex { index, hit: &hit, point: &point, bsdf: &bsdf, wo, throughput, edge: &edge, light_normal };
-        if !hooks.surface(&vertex, tracer, sampler) || index == limits.max_edges {
+        let place = Place::Surface { point: &point, hit: &hit };
+        let vertex = Vertex { index, place, scatter: Scatter::Bsdf(&bsdf), wo, throughput, edge: &edge };
+        if !hooks.vertex(&vertex, tracer, sampler) || index == limits.max_edges {
             return;
         }
 
         let u = sampler.vertex(index, Purpose::Scatter);
-        let Some(sample) = bsdf.sample(wo, [u[0], u[1], u[2]], mode) else { return };
-        let survival = limits.survival(index, &bsdf);
+        let Some(sample) = directions.sample(point.p, &vertex.scatter, wo, [u[0], u[1], u[2]], mode) else { return };
+        let survival = limits.survival(index, &vertex.scatter);
         if u[3] >= survival {
             return;
         }
@@ -118,14 +129,7 @@ pub fn walk<H: WalkHooks>(
             return;
         }
         hooks.leaving(&vertex, &sample);
-        edge = Edge {
-            from: point.p,
-            from_normal: light_normal,
-            pdf: sample.pdf,
-            delta: sample.delta,
-            survival,
-            distance: f32::INFINITY,
-        };
+        edge = Edge { from: point.p, pdf: sample.pdf, delta: sample.delta, survival, distance: f32::INFINITY };
         (o, d) = (offset_point(point.p, point.error, point.ng, sample.wi), sample.wi);
         (t_min, t_max) = (T_MIN, f32::INFINITY);
         kind = match mode {
@@ -133,10 +137,4 @@ pub fn walk<H: WalkHooks>(
             Transport::Importance => RayKind::LightBounce,
         };
     }
-}
-
-/// See [`SurfaceVertex::light_normal`].
-fn light_normal(point: &SurfacePoint, bsdf: &Bsdf, wo: Vec3) -> Option<Vec3> {
-    let n = point.frame.n;
-    (!bsdf.transmits()).then(|| if n.dot(wo) < 0.0 { -n } else { n })
 }

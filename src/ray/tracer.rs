@@ -227,6 +227,11 @@ impl RayStats {
         self.kinds.iter().map(|k| k.rays).sum()
     }
 
+    /// Rays of some kinds.
+    pub fn rays(&self, kinds: &[RayKind]) -> f64 {
+        kinds.iter().map(|k| self.kinds[*k as usize].rays as f64).sum()
+    }
+
     /// Estimated seconds inside the backend, summed over threads.
     pub fn seconds(&self) -> f64 {
         self.kinds.iter().map(KindStats::seconds).sum()

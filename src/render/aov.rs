@@ -4,14 +4,13 @@ use crate::film::Film;
 use crate::image::Layer;
 use crate::math::Vec3;
 use crate::math::sampler::PathSampler;
+use crate::path::streams;
 use crate::prepared::PreparedScene;
 use crate::ray::{Ray, RayKind, Tracer};
 use rayon::prelude::*;
 
 /// Rays per pixel; auxiliary layers converge quickly.
 const RAYS: u64 = 16;
-/// The random stream of auxiliary rays.
-const STREAM: u64 = 2;
 
 /// A layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +54,7 @@ fn pixel(scene: &PreparedScene, x: u32, y: u32, seed: u64) -> [f32; 7] {
     let mut sum = [0.0f32; 7];
     let index = u64::from(y) * u64::from(scene.film_size[0]) + u64::from(x);
     for k in 0..RAYS {
-        let u = PathSampler::new(seed, STREAM, index, k).origin();
+        let u = PathSampler::new(seed, streams::AUXILIARY, index, k).origin();
         let eye = scene.camera.sample_ray([x as f32 + u[0], y as f32 + u[1]], [u[2], u[3]]);
         let ray = Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far };
         let Some(hit) = tracer.closest(&ray, RayKind::Camera) else { continue };

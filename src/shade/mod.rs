@@ -9,10 +9,12 @@
 //! * A delta lobe never shows in `eval` or `pdf`, only in `sample`, where its density is a discrete probability.
 
 pub mod bsdf;
+pub mod medium;
 pub mod point;
 pub mod texture;
 
 pub use bsdf::{Bsdf, BsdfPool, BsdfRef, BsdfSample, Features, KeptBsdf, Material, MaterialSet};
+pub use medium::{MediumPoint, Phase};
 pub use point::SurfacePoint;
 pub use texture::{ColorTexture, ScalarTexture, Texture, TextureSet};
 

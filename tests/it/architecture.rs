@@ -9,14 +9,6 @@ use std::path::{Path, PathBuf};
 const MAX_LINES: usize = 600;
 /// The one file with unsafe code.
 const UNSAFE_FILE: &str = "ray/embree.rs";
-/// Integrators that still import another one, as (importer, imported). An entry that is not needed any more is an error.
-const KNOWN_IMPORTS: [(&str, &str); 5] = [
-    ("bdpt", "resampling"),
-    ("importance", "bdpt"),
-    ("importance", "resampling"),
-    ("light", "bdpt"),
-    ("resampling", "bdpt"),
-];
 /// Rooms whose input comes from outside.
 const NO_UNWRAP: [&str; 3] = ["load", "app", "image"];
 const PRINTS: [&str; 5] = ["println", "eprintln", "print", "eprint", "dbg"];
@@ -137,15 +129,15 @@ fn imports_among_integrators(sources: &[(PathBuf, String)]) -> BTreeMap<(String,
     found
 }
 
-/// Numbers of random streams (constants named `STREAM` or `…_STREAM`) with the names that they have.
-fn streams(sources: &[(PathBuf, String)]) -> BTreeMap<String, BTreeSet<String>> {
-    let mut found: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for (_, text) in sources {
+/// Declarations of random streams (constants named `STREAM` or `…_STREAM`) outside of the one list of streams.
+fn stray_streams(sources: &[(PathBuf, String)]) -> Vec<String> {
+    let mut found = vec![];
+    for (path, text) in sources.iter().filter(|(path, _)| !path.ends_with("path/streams.rs")) {
         let (tokens, _) = without_tests(&tokens(text));
         for (i, token) in tokens.iter().enumerate() {
             let is_stream = token.text == "STREAM" || token.text.ends_with("_STREAM");
-            if is_stream && i > 0 && tokens[i - 1].text == "const" && matches(&tokens, i + 1, &[":", "u64", "="]) {
-                found.entry(tokens[i + 4].text.clone()).or_default().insert(token.text.clone());
+            if is_stream && i > 0 && tokens[i - 1].text == "const" {
+                found.push(format!("src/{}: {}", path.display(), token.text));
             }
         }
     }
@@ -162,20 +154,13 @@ fn the_source_keeps_the_rules() {
 #[test]
 fn integrators_do_not_import_each_other() {
     let found = imports_among_integrators(&sources());
-    let known: BTreeSet<(String, String)> = KNOWN_IMPORTS.iter().map(|(a, b)| ((*a).into(), (*b).into())).collect();
-    let new: Vec<_> = found.iter().filter(|(pair, _)| !known.contains(pair)).collect();
-    assert!(new.is_empty(), "an integrator imports another one: {new:?}");
-    let gone: Vec<_> = known.iter().filter(|pair| !found.contains_key(pair)).collect();
-    assert!(gone.is_empty(), "no longer needed in KNOWN_IMPORTS: {gone:?}");
+    assert!(found.is_empty(), "an integrator imports another one: {found:?}");
 }
 
 #[test]
-fn random_streams_have_numbers_of_their_own() {
-    let found = streams(&sources());
-    assert!(found.len() >= 7, "{found:?}");
-    // One name in two files is one stream: sub-paths from the camera are the same in all integrators.
-    let shared: Vec<_> = found.iter().filter(|(_, names)| names.len() > 1).collect();
-    assert!(shared.is_empty(), "{shared:?}");
+fn random_streams_are_in_one_list() {
+    let found = stray_streams(&sources());
+    assert!(found.is_empty(), "declared outside of path::streams: {found:?}");
 }
 
 #[test]
@@ -274,10 +259,10 @@ fn imports_among_integrators_are_found() {
 }
 
 #[test]
-fn equal_numbers_of_streams_are_found() {
-    let text = "const A_STREAM: u64 = 1; pub const STREAM: u64 = 1; const B_STREAM: u64 = 2; const OTHER: u64 = 2;";
-    let found = streams(&[("a.rs".into(), text.into())]);
-    assert_eq!(found.values().map(BTreeSet::len).collect::<Vec<_>>(), [2, 1]);
+fn stray_streams_are_found() {
+    let text = "const A_STREAM: u64 = 1; pub const STREAM: u64 = 1; const OTHER: u64 = 2;";
+    assert_eq!(stray_streams(&[("a.rs".into(), text.into())]), ["src/a.rs: A_STREAM", "src/a.rs: STREAM"]);
+    assert!(stray_streams(&[("path/streams.rs".into(), text.into())]).is_empty());
 }
 
 #[test]

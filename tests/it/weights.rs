@@ -2,13 +2,17 @@
 //! feature: they sum to one, the fast ones are the slow ones, and they depend on nothing that they should not.
 
 use crate::support::gallery::{GALLERY, exhibit};
+use crate::support::methods::{bidirectional_methods, for_small_scenes};
 use crate::support::pictures::{parse, prepare};
-use lightsieve::integrators::replay::Contribution;
-use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt, importance, resampling};
+use lightsieve::bidir::ContributionRecord;
+use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt};
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
-use lightsieve::mis::definition::{Densities, densities};
-use lightsieve::mis::{End, Heuristic, Joint, Node, Split, Techniques, Weigher};
-use lightsieve::path::{FullPath, Limits};
+use lightsieve::mis::factors::Balance;
+use lightsieve::mis::{
+    ConnectedPath, EmitterFactors, EndpointPdfs, Heuristic, MisContext, PathEnd, PathPdfs, ReversePath, Techniques,
+    VertexPdfs,
+};
+use lightsieve::path::{FullPath, PathLimits, ScatterSampler};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
 
@@ -18,7 +22,7 @@ fn found(
     scene: &PreparedScene,
     params: &[(&str, &str)],
     iterations: u64,
-) -> Vec<Contribution> {
+) -> Vec<ContributionRecord> {
     let mut values = Params::defaults(spec);
     for (name, value) in params {
         values.set(name, value).unwrap();
@@ -35,11 +39,18 @@ fn found(
     all
 }
 
-fn weigher(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, roulette_from: u32) -> Weigher {
+fn context(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, rr_depth: u32) -> MisContext<Balance> {
     let mut techniques = Techniques::parse(techniques).unwrap();
     techniques.set_light_paths(scene.film_size[0] as f32 * scene.film_size[1] as f32);
-    let limits = Limits { max_edges: u32::MAX, roulette_from, keep: 1.0 };
-    Weigher { techniques, heuristic, eye_limits: limits, light_limits: limits, resampled: None, lengths: None }
+    let limits = PathLimits { max_edges: u32::MAX, rr_depth, rr_scale: 1.0 };
+    MisContext {
+        techniques,
+        heuristic,
+        eye_limits: limits,
+        light_limits: limits,
+        directions: ScatterSampler,
+        factor: Balance,
+    }
 }
 
 /// How far the rounding of positions, from which the definition computes directions and cosines anew, changes these: it counts on short
@@ -73,7 +84,7 @@ fn fast_weights_are_those_of_the_definition() {
                     let what = format!("{name} {crop:?} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
                     assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
                     let error = (f64::from(c.weight) - c.techniques[s].1).abs();
-                    let tolerance = (6e-5 + c.path.as_ref().map_or(0.0, rounding)).min(2e-4);
+                    let tolerance = (6e-5 + c.path.as_ref().map_or(0.0f64, rounding)).min(2e-4);
                     assert!(error < tolerance, "{} off by {error} > {tolerance} {what}", c.weight);
                     checked += 1;
                 }
@@ -83,102 +94,98 @@ fn fast_weights_are_those_of_the_definition() {
     assert!(checked > 60_000, "{checked}");
 }
 
+/// Every registered method, with parameters that lead through all its weights; a new method takes part by being registered.
 #[test]
-fn resampling_aware_weights_are_those_of_the_definition() {
-    let (mut checked, mut connections) = (0, 0);
-    for name in GALLERY {
-        let scene = prepare(exhibit(name), Backend::default_available(), None);
-        for (i, techniques) in SUBSETS.into_iter().enumerate() {
-            let roulette = ["5", "1", "2"][i % 3];
-            let paths = ["200", "7", "1"][i % 3];
-            // A film of 64 pixels needs more than its share of cache points.
-            let params = [
-                ("proposal_model", ["mixture", "per-cache", "mixture-with-visibility"][(i + i / 3) % 3]),
-                ("techniques", techniques),
-                ("rr_depth", roulette),
-                ("presampled_paths", paths),
-                ("cache_density", "0.5"),
-                ("rr_scale", ["1", "0.4"][i % 2]),
-            ];
-            let two_stage = [&params[..], &[("second_stage_paths", ["16", "1", "200"][i % 3])]].concat();
-            let one = found(&resampling::RIS, &scene, &params, 2);
-            let drawn = [
-                ("selection", ["per-length", "all-lengths"][(i + i / 2) % 2]),
-                ("connections_per_vertex", ["1", "4"][i % 2]),
-                ("techniques", techniques),
-                ("rr_depth", roulette),
-                ("presampled_paths", ["1024", "20", "1"][i % 3]),
-            ];
-            let skeleton = [&drawn[..], &[("node_acceptance", "0"), ("voxel_resolution", "30")]].concat();
-            let records = [&drawn[..], &[("record_density", "0.2")]].concat();
-            let all = [
-                one,
-                found(&resampling::TWO_STAGE, &scene, &two_stage, 2),
-                found(&importance::SKELETON, &scene, &skeleton, 2),
-                found(&importance::IC_BDPT, &scene, &records, 2),
-            ];
-            for c in all.into_iter().flatten() {
-                let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
-                let what = format!("{name} {params:?} ({s}, {}): {:?}", c.t, c.techniques);
-                assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
-                assert!((f64::from(c.weight) - c.techniques[s].1).abs() < 1e-4, "{} {what}", c.weight);
-                checked += 1;
-                connections += usize::from(s >= 2 && c.t >= 2);
+fn weights_of_every_method_are_those_of_the_definition() {
+    for spec in bidirectional_methods() {
+        let (mut checked, mut connections) = (0, 0);
+        for name in GALLERY {
+            let scene = prepare(exhibit(name), Backend::default_available(), None);
+            for (i, techniques) in SUBSETS.into_iter().enumerate() {
+                let mut params = for_small_scenes(spec, i);
+                let mut set = |name: &'static str, value: &'static str| {
+                    if spec.params().any(|p| p.name == name) {
+                        params.push((name, value));
+                    }
+                };
+                set("techniques", techniques);
+                set("rr_depth", ["5", "1", "2"][i % 3]);
+                for c in found(spec, &scene, &params, 2) {
+                    let (s, sum) = (c.s, c.techniques.iter().map(|t| t.1).sum::<f64>());
+                    let what = format!("{} {name} {params:?} ({s}, {}): {:?}", spec.name, c.t, c.techniques);
+                    assert!((sum - 1.0).abs() < 1e-12, "{sum} {what}");
+                    assert!((f64::from(c.weight) - c.techniques[s].1).abs() < 1e-4, "{} {what}", c.weight);
+                    checked += 1;
+                    connections += usize::from(s >= 2 && c.t >= 2);
+                }
             }
         }
+        let connects = spec.name != "light";
+        assert!(checked > 1000 && (connections > 250) == connects, "{} {checked} {connections}", spec.name);
     }
-    assert!(checked > 8000 && connections > 2000, "{checked} {connections}");
 }
 
-/// Weight of the technique with s light vertices, evaluated as if it had sampled the path. What the evaluation must not look at is
-/// poisoned.
-fn fast(weigher: &Weigher, d: &Densities, s: usize) -> f32 {
-    let k = d.eye.len() - 1;
-    const POISON: f32 = -1000.0;
-    // Survival is part of both densities here.
-    let side =
-        |n: usize, own: &dyn Fn(usize) -> f64, other: &dyn Fn(usize) -> f64, smooth: &dyn Fn(usize) -> bool, end| {
-            let mut nodes: Vec<Node> = (0..n)
-                .map(|i| Node {
-                    forward: AreaPdf(own(i) as f32),
-                    spread: 1.0,
-                    survival: 1.0,
-                    ratio: if i + 2 < n { (other(i) / own(i)) as f32 } else { POISON },
-                    smooth: i + 1 < n && smooth(i),
-                    shorter: [POISON; 2],
-                    ..Node::origin(AreaPdf(0.0))
-                })
-                .collect();
-            // All but the last vertex have been left.
-            for left in 1..n {
-                weigher.sum_up(&mut nodes[..left], end);
-            }
-            let joint = Joint {
-                arrival: AreaPdf(if n >= 1 { other(n - 1) as f32 } else { POISON }),
-                departure: SolidAnglePdf(if n >= 2 { other(n - 2) as f32 } else { POISON }),
-            };
-            (nodes, joint)
+/// Densities of the first n vertices of one end of a path, as the walk from there keeps them when it has arrived at the last. Numbers that
+/// must not be read are poisoned.
+struct Subpath<'a> {
+    n: usize,
+    /// Density of vertex i by the walk from this end.
+    own: &'a dyn Fn(usize) -> f64,
+    /// Density of vertex i by the walk from the other end.
+    other: &'a dyn Fn(usize) -> f64,
+    connectable: &'a dyn Fn(usize) -> bool,
+    end: PathEnd,
+}
+
+const POISON: f32 = -1000.0;
+
+impl Subpath<'_> {
+    fn pdfs(&self, mis: &MisContext<Balance>) -> (Vec<VertexPdfs>, EndpointPdfs) {
+        let (n, own, other) = (self.n, self.own, self.other);
+        // Survival is part of both densities here.
+        let mut vertices: Vec<VertexPdfs> = (0..n)
+            .map(|i| VertexPdfs {
+                pdf_fwd: AreaPdf(own(i) as f32),
+                area_jacobian: 1.0,
+                survival: 1.0,
+                rev_over_fwd: if i + 2 < n { (other(i) / own(i)) as f32 } else { POISON },
+                connectable: i + 1 < n && (self.connectable)(i),
+                partial_sums: [POISON; 2],
+                ..VertexPdfs::origin(AreaPdf(0.0))
+            })
+            .collect();
+        // All but the last vertex have been left.
+        for left in 1..n {
+            mis.accumulate_partial_sums(&mut vertices[..left], self.end);
+        }
+        let end = EndpointPdfs {
+            pdf_rev: AreaPdf(if n >= 1 { other(n - 1) as f32 } else { POISON }),
+            pdf_rev_prev: SolidAnglePdf(if n >= 2 { other(n - 2) as f32 } else { POISON }),
         };
-    // A vertex has smooth events unless no edge beside it can be a connection.
-    let smooth = |i: usize| i == 0 || i == k || d.joinable[i] || d.joinable[i + 1];
-    let light_end = End::Light { can_be_hit: d.joinable[0], next_event: d.next_event as f32 };
+        (vertices, end)
+    }
+}
+
+/// Weight of the technique with s light vertices, evaluated as if it had sampled the path.
+fn fast(mis: &MisContext<Balance>, d: &PathPdfs, s: usize) -> f32 {
+    let k = d.eye.len() - 1;
+    // A vertex has events with densities unless no edge beside it can be a connection.
+    let connectable = |i: usize| i == 0 || i == k || d.connectable[i] || d.connectable[i + 1];
+    let emitter = EmitterFactors { can_be_hit: d.connectable[0], next_event: d.next_event as f32 };
     let light = |i: usize| d.light.get(i).copied().unwrap_or(0.0);
-    let (light_nodes, light_joint) = side(s, &light, &|i| d.eye[i], &smooth, light_end);
-    let (eye_nodes, eye_joint) = side(k + 1 - s, &|i| d.eye[k - i], &|i| light(k - i), &|i| smooth(k - i), End::Lens);
-    let weight = weigher.weight(&Split {
-        light: &light_nodes,
-        light_joint,
-        eye: &eye_nodes,
-        eye_lit: &[],
-        eye_proposals: None,
-        eye_joint,
-        next_event: d.next_event as f32,
-        light_can_be_hit: d.joinable[0],
-        factor: 1.0,
-        arriving: Rgb::BLACK,
-        adjoint: Rgb::BLACK,
-    });
-    weight.own
+    let light_side =
+        Subpath { n: s, own: &light, other: &|i| d.eye[i], connectable: &connectable, end: PathEnd::Light(emitter) };
+    let eye_side = Subpath {
+        n: k + 1 - s,
+        own: &|i| d.eye[k - i],
+        other: &|i| light(k - i),
+        connectable: &|i| connectable(k - i),
+        end: PathEnd::Lens,
+    };
+    let ((light, light_end), (eye, eye_end)) = (light_side.pdfs(mis), eye_side.pdfs(mis));
+    let reverse = ReversePath { vertices: &[], edges: &[], last_edge: (), throughput: Rgb::BLACK, value: Rgb::BLACK };
+    let path = ConnectedPath { light: &light, light_end, eye: &eye, eye_end, emitter, connection_factor: 1.0, reverse };
+    mis.weight(&path).own
 }
 
 #[test]
@@ -189,17 +196,16 @@ fn weights_of_all_techniques_sum_to_one() {
         let paths: Vec<FullPath> = found(&bdpt::SPEC, &scene, &[], 8).into_iter().filter_map(|c| c.path).collect();
         for path in &paths {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
-                let weigher =
-                    weigher(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], [5, 2][i / 2 % 2]);
-                let d = densities(&scene, &weigher, &|_, _| 1.0, path);
-                let slow = d.weights(&weigher);
+                let mis = context(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], [5, 2][i / 2 % 2]);
+                let d = PathPdfs::new(&scene, &mis, &|_| 1.0, path);
+                let slow = d.weights(&mis);
                 // A subset need not have any technique that makes the path; single precision has no densities beyond its range.
                 let extreme = |p: &f64| *p > 0.0 && !(1e-15..1e15).contains(p);
                 if slow.iter().all(|w| w.is_nan() || *w == 0.0) || d.light.iter().chain(&d.eye).any(extreme) {
                     continue;
                 }
-                let possible = |s: &usize| d.log_shares(&weigher)[*s] > f64::NEG_INFINITY;
-                let sum: f32 = (0..slow.len()).filter(possible).map(|s| fast(&weigher, &d, s)).sum();
+                let possible = |s: &usize| d.log_effective_pdfs(&mis)[*s] > f64::NEG_INFINITY;
+                let sum: f32 = (0..slow.len()).filter(possible).map(|s| fast(&mis, &d, s)).sum();
                 assert!((sum - 1.0).abs() < 1e-5, "{name} {techniques}: {sum}, {slow:?}");
                 checked += 1;
             }

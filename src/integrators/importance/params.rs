@@ -1,7 +1,7 @@
 //! Parameters of importance caching.
 
+use crate::integrators::params::presampled;
 use crate::integrators::params::{AliasValues, Choice, ParamAlias, ParamDefault, ParamSpec};
-use crate::integrators::resampling::params as resampling;
 
 /// N of Noël and Biri 2015.
 pub(super) const PRESAMPLED_PATHS: ParamSpec = ParamSpec {
@@ -10,7 +10,7 @@ pub(super) const PRESAMPLED_PATHS: ParamSpec = ParamSpec {
     long: "Of all light sub-paths of an iteration these take part in resampled connections; the others serve the \
         light image only. More of them make better connections and dearer iterations. Published: 1024 (Noël and Biri \
         2015, section 5).",
-    ..resampling::PRESAMPLED_PATHS
+    ..presampled::PRESAMPLED_PATHS
 };
 
 /// Light sub-paths of virtual lights.
@@ -27,7 +27,7 @@ pub(super) const CONNECTIONS_PER_VERTEX: ParamSpec = ParamSpec {
     short: "Connections of each eye vertex to resampled light sub-paths",
     long: "With selection=per-length it is the number for each length of light sub-paths. More of them make an \
         iteration less noisy and dearer. Published: 1 for each length.",
-    ..resampling::CONNECTIONS_PER_VERTEX
+    ..presampled::CONNECTIONS_PER_VERTEX
 };
 
 /// Connections of many-light rendering.

@@ -3,10 +3,10 @@
 //!
 //! A pinhole or lens that looks at the world through a mirror or a pane is never reached: such paths are missing.
 
-use super::IntegratorSpec;
-use super::bdpt::Bidirectional;
 use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL};
-use crate::mis::{Heuristic, Techniques};
+use super::{IntegratorSpec, bidirectional};
+use crate::bidir::{Bidirectional, NoConnections};
+use crate::mis::Techniques;
 use crate::prepared::Features;
 
 /// The registry's line.
@@ -14,10 +14,10 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
     name: "light",
     aliases: &["ptracer"],
     short: "Light tracing: sub-paths from the lights, each vertex connected to the lens",
-    long: "It renders caustics well, and nothing that the camera sees in a mirror or through glass. It is \
-        bidirectional path tracing with the techniques t = 1 alone.\n\n\
-        Dutré, Lafortune and Willems 1993, \"Monte Carlo light tracing with direct computation of pixel \
-        intensities\"; Veach 1997, section 8.3.4.",
+    long: "It renders caustics well, and nothing that the camera sees in a mirror or through glass. It is bidirectional path \
+        tracing with the techniques t = 1 alone.\n\n\
+        Dutré, Lafortune and Willems 1993, \"Monte Carlo light tracing with direct computation of pixel intensities\"; Veach \
+        1997, section 8.3.4.",
     params: &[&[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS]],
     unbiased: true,
     limitations: |features| {
@@ -28,6 +28,6 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
     build: |params| {
         let mut techniques = Techniques::none();
         techniques.switch(0..usize::MAX, 1..2, true);
-        Box::new(Bidirectional::new(params, Heuristic::Balance, techniques))
+        Box::new(Bidirectional::new(bidirectional::settings(params, techniques), NoConnections))
     },
 };

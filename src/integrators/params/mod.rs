@@ -1,5 +1,6 @@
 //! Parameters of integrators: declared once with default and meaning, set by `-p key=value` or a scene's `<integrator>` block.
 
+pub(super) mod presampled;
 pub(super) mod shared;
 mod spec;
 

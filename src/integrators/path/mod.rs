@@ -3,20 +3,26 @@
 //! Two techniques make every path of k edges that ends on a light with extent. Seen from its last vertex x before the light, *hit* draws
 //! the direction from the BSDF, with density p_bsdf · q (q: survival of Russian roulette at x) per steradian, and *next event* draws a light
 //! with probability P(l | x) and a direction to it with density p_l per steradian. Both weigh their paths by the heuristic
-//! over these two densities, so the weights of a path sum to one. Delta lights are reached by next event alone, and what follows a
-//! delta lobe by hits alone, each with weight one.
+//! over these two densities, so the weights of a path sum to one. Delta lights are reached by next event alone, and after a delta event or
+//! from the camera lights are hit alone, each with weight one.
 
 use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_UNIDIRECTIONAL, heuristic};
-use super::replay::{Contribution, Replay};
 use super::{Integrator, IntegratorSpec, Iteration, Params};
-use crate::emit::{DirectSample, Light};
+use crate::bidir::endpoint::{
+    DirectLight, emitted_at, for_each_background, light_choice_normal, next_event_pdf, sample_direct,
+};
+use crate::bidir::replay::{ContributionRecord, Replay, SubpathKind};
+use crate::emit::{DirectSample, LightId};
 use crate::film::{Film, FilmTile, Part, SampleBuffer};
-use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::sampler::PathSampler;
 use crate::math::{Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Heuristic;
-use crate::path::{Edge, Limits, ShadowQueue, SurfaceVertex, WalkHooks, WalkStart, direct_segment, walk};
+use crate::path::{
+    Edge, PathLimits, ScatterSampler, ShadowQueue, Transmittance, Vertex, WalkHooks, WalkRules, WalkStart,
+    direct_segment, streams, walk,
+};
 use crate::prepared::PreparedScene;
-use crate::ray::{Phases, Ray, RayKind, RayStats, Tracer};
+use crate::ray::{Phases, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use rayon::prelude::*;
 
@@ -25,22 +31,19 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
     name: "path",
     aliases: &["volpath", "volpathmis", "prb"],
     short: "Path tracing with next-event estimation",
-    long: "Paths are traced from the camera. At every vertex a light is sampled, and the sample is combined with \
-        hits of lights by multiple importance sampling. It is the simplest method and the best one where light is \
-        easy to reach from what the camera sees.\n\n\
-        Kajiya 1986, \"The rendering equation\"; Veach 1997, \"Robust Monte Carlo methods for light transport \
-        simulation\", chapter 9 and section 10.2.",
+    long: "Paths are traced from the camera. At every vertex a light is sampled, and the sample is combined with hits of lights \
+        by multiple importance sampling. It is the simplest method and the best one where light is easy to reach from \
+        what the camera sees.\n\n\
+        Kajiya 1986, \"The rendering equation\"; Veach 1997, \"Robust Monte Carlo methods for light transport simulation\", \
+        chapter 9 and section 10.2.",
     params: &[&[MAX_DEPTH, RR_DEPTH_UNIDIRECTIONAL, HIDE_EMITTERS, heuristic("power")]],
     unbiased: true,
     limitations: |_| None,
     build: |params| Box::new(PathTracer::new(params)),
 };
 
-/// The random stream of eye sub-paths.
-const EYE_STREAM: u64 = 1;
-
 struct PathTracer {
-    limits: Limits,
+    limits: PathLimits,
     hide_emitters: bool,
     heuristic: Heuristic,
 }
@@ -48,68 +51,59 @@ struct PathTracer {
 impl PathTracer {
     fn new(params: &Params) -> PathTracer {
         PathTracer {
-            limits: Limits {
+            limits: PathLimits {
                 max_edges: u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX),
-                roulette_from: params.int("rr_depth") as u32,
-                keep: 1.0,
+                rr_depth: params.int("rr_depth") as u32,
+                rr_scale: 1.0,
             },
             hide_emitters: params.bool("hide_emitters"),
             heuristic: if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power },
         }
     }
 
-    /// One sample of the pixel (x, y), which is number `hooks.pixel` of its tile.
-    fn sample(&self, iteration: &Iteration, (x, y): (u32, u32), tracer: &mut Tracer, hooks: &mut Gather) {
-        let scene = iteration.scene;
-        let index = u64::from(y) * u64::from(scene.film_size[0]) + u64::from(x);
-        let mut sampler = PathSampler::new(iteration.seed, EYE_STREAM, index, iteration.index);
-        let u = sampler.origin();
-        let (offset, weight) = scene.filter.sample([u[0], u[1]]);
-        let raster = [x as f32 + 0.5 + offset[0], y as f32 + 0.5 + offset[1]];
-        let eye = scene.camera.sample_ray(raster, [u[2], u[3]]);
-        let start = WalkStart {
-            ray: Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far },
-            throughput: Rgb::grey(weight),
-            pdf: SolidAnglePdf(1.0),
-            delta: true,
-            kind: RayKind::Camera,
-        };
-        walk(scene, start, &self.limits, Transport::Radiance, tracer, &mut sampler, hooks);
+    /// One sample of a pixel, which is number `hooks.pixel` of its tile.
+    fn sample(&self, iteration: &Iteration, pixel: (u32, u32), tracer: &mut Tracer, hooks: &mut Gather) {
+        let index = iteration.pixel_index(pixel.0, pixel.1);
+        let mut sampler = PathSampler::new(iteration.seed, streams::EYE, index, iteration.index);
+        let start = WalkStart::from_camera(iteration, pixel, &mut sampler).walk;
+        let rules = WalkRules { limits: self.limits, mode: Transport::Radiance, directions: &ScatterSampler };
+        hooks.normal_before = None;
+        walk(iteration.scene, start, &rules, tracer, &mut sampler, hooks);
     }
 
     fn render_tile(&self, iteration: &Iteration, tile: &mut FilmTile, samples: &mut SampleBuffer) -> RayStats {
         let scene = iteration.scene;
-        let mut tracer = Tracer::new(&*scene.query);
+        let mut tracer = iteration.tracer();
         let mut queue = ShadowQueue::new(RayKind::ShadowDirect);
         samples.clear(tile.pixels());
-        let mut hooks = Gather { tracer: self, scene, pixel: 0, samples, queue: &mut queue, record: None };
+        let mut hooks = Gather::new(self, scene, samples, &mut queue);
         for pixel in 0..tile.pixels() {
             hooks.pixel = pixel;
             self.sample(iteration, tile.pixel(pixel), &mut tracer, &mut hooks);
         }
-        queue.flush(&mut tracer, |c| c.arrive(samples, None));
+        queue.flush(&mut tracer, |light, transmittance| light.arrive(transmittance, samples, None));
         tile.commit(samples, None, iteration.index);
         tracer.stats
     }
 }
 
-/// What a shadow ray carries.
+/// The payload of a shadow ray.
 #[derive(Clone, Copy, Default)]
-struct Carried {
+struct QueuedLight {
     /// Pixel of the tile.
     pixel: u32,
     /// Number of the contribution in a replay.
-    note: u32,
+    replay_index: u32,
     light: Rgb,
 }
 
-impl Carried {
-    /// Nothing was in the way.
+impl QueuedLight {
+    /// Nothing blocked the ray.
     #[inline]
-    fn arrive(self, samples: &mut SampleBuffer, record: Option<&mut Replay>) {
-        samples.add(Part::Direct, self.pixel, self.light);
-        if let Some(record) = record {
-            record.contributions[self.note as usize].visible = true;
+    fn arrive(self, transmittance: Transmittance, samples: &mut SampleBuffer, replay: Option<&mut Replay>) {
+        samples.add(Part::Direct, self.pixel, self.light * transmittance);
+        if let Some(replay) = replay {
+            replay.contributions[self.replay_index as usize].visible = true;
         }
     }
 }
@@ -130,144 +124,132 @@ impl Integrator for PathTracer {
     }
 
     fn replay(&mut self, iteration: &Iteration, pixel: (u32, u32)) -> Replay {
-        let scene = iteration.scene;
         let (mut replay, mut samples) = (Replay { pixel, ..Replay::default() }, SampleBuffer::default());
         samples.clear(1);
-        let (mut tracer, mut queue) = (Tracer::new(&*scene.query), ShadowQueue::new(RayKind::ShadowDirect));
-        let mut hooks = Gather {
-            tracer: self,
-            scene,
-            pixel: 0,
-            samples: &mut samples,
-            queue: &mut queue,
-            record: Some(&mut replay),
-        };
+        let (mut tracer, mut queue) = (iteration.tracer(), ShadowQueue::new(RayKind::ShadowDirect));
+        let mut hooks = Gather::new(self, iteration.scene, &mut samples, &mut queue);
+        hooks.replay = Some(&mut replay);
         self.sample(iteration, pixel, &mut tracer, &mut hooks);
-        queue.flush(&mut tracer, |c| c.arrive(&mut samples, Some(&mut replay)));
+        queue.flush(&mut tracer, |light, transmittance| {
+            light.arrive(transmittance, &mut samples, Some(&mut replay));
+        });
         replay
     }
 }
 
-/// Collects light along one eye walk.
+/// Gathers light along one eye walk.
 struct Gather<'a> {
-    tracer: &'a PathTracer,
+    rules: &'a PathTracer,
     scene: &'a PreparedScene,
     pixel: u32,
+    /// The light choice normal of the vertex before.
+    normal_before: Option<Vec3>,
     samples: &'a mut SampleBuffer,
-    queue: &'a mut ShadowQueue<Carried>,
-    record: Option<&'a mut Replay>,
+    queue: &'a mut ShadowQueue<QueuedLight>,
+    replay: Option<&'a mut Replay>,
 }
 
-impl Gather<'_> {
-    /// Weight of a hit whose direction next event would have drawn with the density `next_event`.
-    fn hit_weight(&self, edge: &Edge, next_event: impl FnOnce() -> SolidAnglePdf) -> f32 {
-        if edge.delta {
-            1.0
-        } else {
-            self.tracer.heuristic.weight(SolidAnglePdf(edge.pdf.0 * edge.survival), next_event())
-        }
+/// A hit of a light.
+struct EmitterHit<'a> {
+    light: LightId,
+    /// Number of the vertex on the light.
+    index: u32,
+    /// Unit direction from the vertex before to the light.
+    direction: Vec3,
+    /// Throughput times emitted radiance.
+    raw: Rgb,
+    edge: &'a Edge,
+}
+
+impl<'a> Gather<'a> {
+    fn new(
+        rules: &'a PathTracer,
+        scene: &'a PreparedScene,
+        samples: &'a mut SampleBuffer,
+        queue: &'a mut ShadowQueue<QueuedLight>,
+    ) -> Gather<'a> {
+        Gather { rules, scene, pixel: 0, normal_before: None, samples, queue, replay: None }
     }
 
     fn hidden(&self, index: u32) -> bool {
-        index == 1 && self.tracer.hide_emitters
+        index == 1 && self.rules.hide_emitters
     }
 
-    /// Next event: queues the light that one sampled point of one light would bring.
-    #[inline]
-    fn next_event(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) {
-        let u = sampler.vertex(vertex.index, Purpose::Emitter);
-        let lights = &self.scene.lights;
-        let point = vertex.point;
-        let Some((id, chosen)) = lights.pick_from(point.p, vertex.light_normal, u[0]) else { return };
-        // The same twice: the sample of a triangle, by far the most common, stays in registers; one of any kind goes through memory.
-        match lights.get(id) {
-            Light::Triangle(light) => {
-                if let Some(light) = light.sample_direct(point.p, [u[1], u[2]]) {
-                    self.connect(vertex, &light, chosen, tracer);
-                }
-            }
-            light => {
-                if let Some(light) = light.sample_direct(point.p, [u[1], u[2]]) {
-                    self.connect(vertex, &light, chosen, tracer);
-                }
-            }
-        }
-    }
-
-    /// Queues what the light sample `light` brings, which was drawn from a light chosen with probability `chosen`.
+    /// Queues the light of `sample`, which was drawn from a light of probability `pmf`.
     #[inline(always)]
-    fn connect(&mut self, vertex: &SurfaceVertex, light: &DirectSample, chosen: Pmf, tracer: &mut Tracer) {
-        let point = vertex.point;
-        let (value, bsdf_pdf) = vertex.bsdf.eval_and_pdf(vertex.wo, light.wi, Transport::Radiance);
-        if value.is_black() {
-            return;
-        }
-        let density = light.pdf * chosen;
-        let weight = if light.delta {
+    fn next_event(&mut self, vertex: &Vertex, sample: &DirectSample, pmf: Pmf, tracer: &mut Tracer) {
+        let Some(direct) = DirectLight::new(vertex, &ScatterSampler, sample, pmf) else { return };
+        let weight = if sample.delta {
             1.0
         } else {
-            let survival = self.tracer.limits.survival(vertex.index, vertex.bsdf);
-            self.tracer.heuristic.weight(density, SolidAnglePdf(bsdf_pdf.0 * survival))
+            let survival = self.rules.limits.survival(vertex.index, &vertex.scatter);
+            self.rules.heuristic.weight(direct.pdf, SolidAnglePdf(direct.scatter_pdf.0 * survival))
         };
-        let raw = vertex.throughput * value * light.radiance * (1.0 / density.0);
-        let contribution = raw * weight;
+        let light = direct.raw * weight;
         // A black contribution needs no ray; one that is not finite goes on to the film, which reports it.
-        if contribution.is_black() {
+        if light.is_black() {
             return;
         }
-        let segment = direct_segment(point, light);
-        let note = self.note((1, vertex.index as usize + 1), raw, weight, false);
-        let carried = Carried { pixel: self.pixel, note, light: contribution };
-        let (samples, record) = (&mut *self.samples, &mut self.record);
-        self.queue.push(&segment, carried, tracer, |c| c.arrive(samples, record.as_deref_mut()));
+        let segment = direct_segment(&vertex.place.segment_end(), sample);
+        let replay_index = self.record((1, vertex.index as usize + 1), direct.raw, weight, false);
+        let queued = QueuedLight { pixel: self.pixel, replay_index, light };
+        let (samples, replay) = (&mut *self.samples, &mut self.replay);
+        self.queue.push(&segment, queued, tracer, |light, transmittance| {
+            light.arrive(transmittance, samples, replay.as_deref_mut());
+        });
     }
 
-    /// Writes a contribution down if somebody wants to know; returns its number.
+    /// Adds the light of a hit.
     #[inline]
-    fn note(&mut self, technique: (usize, usize), raw: Rgb, weight: f32, visible: bool) -> u32 {
-        match &mut self.record {
+    fn hit(&mut self, hit: &EmitterHit) {
+        let EmitterHit { light, index, direction, raw, edge } = *hit;
+        // No other technique finds what the camera sees, or what follows a delta event.
+        let weight = if index == 1 || edge.delta {
+            1.0
+        } else {
+            let next_event = next_event_pdf(self.scene, light, edge, self.normal_before, direction);
+            self.rules.heuristic.weight(edge.pdf_with_survival(), next_event)
+        };
+        self.record((0, index as usize + 1), raw, weight, true);
+        self.samples.add(Part::AtOnce, self.pixel, raw * weight);
+    }
+
+    /// Writes a contribution down in a replay; returns its number.
+    #[inline]
+    fn record(&mut self, technique: (usize, usize), raw: Rgb, weight: f32, visible: bool) -> u32 {
+        match &mut self.replay {
             None => 0,
-            Some(record) => {
-                let contribution = Contribution::new(technique, record.pixel, raw, weight);
-                record.contributions.push(Contribution { visible, ..contribution });
-                record.contributions.len() as u32 - 1
+            Some(replay) => {
+                let contribution = ContributionRecord::new(technique, replay.pixel, raw, weight);
+                replay.contributions.push(ContributionRecord { visible, ..contribution });
+                replay.contributions.len() as u32 - 1
             }
         }
-    }
-
-    /// Adds what the walk met.
-    fn hit(&mut self, t: usize, raw: Rgb, weight: f32) {
-        self.note((0, t), raw, weight, true);
-        self.samples.add(Part::AtOnce, self.pixel, raw * weight);
     }
 }
 
 impl WalkHooks for Gather<'_> {
     #[inline]
-    fn surface(&mut self, vertex: &SurfaceVertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
-        if let Some(record) = &mut self.record {
-            record.vertex(true, vertex);
+    fn vertex(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
+        let (scene, index) = (self.scene, vertex.index);
+        if let Some(replay) = &mut self.replay {
+            replay.vertex(SubpathKind::Eye, scene, vertex);
         }
-        let lights = &self.scene.lights;
-        if let Some(id) = self.scene.light_of(vertex.hit)
-            && !self.hidden(vertex.index)
+        if !self.hidden(index)
+            && let Some((light, emitted)) = emitted_at(scene, vertex)
         {
-            let light = lights.get(id);
-            let emitted = light.emitted([vertex.hit.u, vertex.hit.v], vertex.wo);
-            if !emitted.is_black() {
-                let edge = vertex.edge;
-                let weight = self.hit_weight(edge, || {
-                    light.pdf_direct(edge.from, -vertex.wo, edge.distance)
-                        * lights.pmf_from(edge.from, edge.from_normal, id)
-                });
-                self.hit(vertex.index as usize + 1, vertex.throughput * emitted, weight);
-            }
+            let (direction, raw) = (-vertex.wo, vertex.throughput * emitted);
+            self.hit(&EmitterHit { light, index, direction, raw, edge: vertex.edge });
         }
-        if vertex.bsdf.is_black() {
+        if vertex.scatter.is_black() {
             return false;
         }
-        if vertex.index < self.tracer.limits.max_edges && vertex.bsdf.connectable() {
-            self.next_event(vertex, tracer, sampler);
+        let normal = light_choice_normal(scene, vertex);
+        self.normal_before = normal;
+        if index < self.rules.limits.max_edges && vertex.scatter.connectable() {
+            sample_direct(scene, vertex, normal, sampler, |_, pmf, sample| {
+                self.next_event(vertex, sample, pmf, tracer);
+            });
         }
         true
     }
@@ -276,17 +258,8 @@ impl WalkHooks for Gather<'_> {
         if self.hidden(index) {
             return;
         }
-        let lights = &self.scene.lights;
-        for &id in lights.infinite() {
-            let light = lights.get(id);
-            let emitted = light.emitted([0.0; 2], -direction);
-            if !emitted.is_black() {
-                let weight = self.hit_weight(edge, || {
-                    light.pdf_direct(edge.from, direction, f32::INFINITY)
-                        * lights.pmf_from(edge.from, edge.from_normal, id)
-                });
-                self.hit(index as usize + 1, throughput * emitted, weight);
-            }
-        }
+        for_each_background(self.scene, direction, |light, emitted| {
+            self.hit(&EmitterHit { light, index, direction, raw: throughput * emitted, edge });
+        });
     }
 }

@@ -1,35 +1,34 @@
-//! Probabilities of an iteration's light vertices at cache points.
+//! The pmfs of an iteration's light vertices at cache points.
 //!
 //! A group of cache points has *entries*: the light vertices that its points choose from. With one stage these are all vertices of the
 //! iteration. With two stages the vertices are cut into M₂ clusters that look like one point from the group, and one is drawn from each:
 //! Y_j of cluster C_j with P₁ = (f_y/p)(Y_j) / S_j, S_j = Σ over C_j of f_y/p (Nabata et al. 2020, "Two-stage resampling", §5.1).
 //!
-//! Every cache point then has a probability P₂(j) of its entries, proportional to q̂₂/(p P₁): what the entry brings there, visibility
-//! included, times the number that it stands for. One drawn per cluster, the entries sum up to the whole by themselves: there is no
-//! 1/M₂, which eq. 15 there needs for M₂ independent draws.
+//! Every cache point then has a pmf P₂(j) of its entries, proportional to q̂₂/(p P₁): the light that the entry brings to the cache point,
+//! visibility included, times the number of vertices that the entry represents.
+//!
+//! DEVIATION: eq. 15 there divides by M₂, which is right for M₂ independent draws from one P₁. One drawn per cluster, the entries sum up to
+//! the whole by themselves: there is no 1/M₂, and P₂ has the factor S_j, which eq. 16 leaves out.
 //!
 //! Shadow rays go out in packets, from all points of a group to one light vertex.
 
-use super::caches::{Caches, Found};
-use super::store::LightStore;
+use super::cache_points::{CachePoints, FoundLight};
+use crate::bidir::VertexStore;
 use crate::math::hash::HashRng;
-use crate::prepared::PreparedScene;
+use crate::path::{Iteration, streams};
 use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
 use crate::spatial::point_tree::CutMemory;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The random stream of first stages.
-const FIRST_STAGE_STREAM: u64 = 6;
-
 /// A light vertex that a group of cache points chooses from.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     /// Its place in the store's order.
     vertex: u32,
-    /// 1/P₁: what it stands for, in multiples of itself.
-    stands_for: f32,
+    /// 1/P₁: the number of vertices like itself that it represents.
+    inv_p1: f32,
 }
 
 /// Probabilities of one group of cache points.
@@ -41,15 +40,15 @@ pub(super) struct GroupPmf {
     entries: Vec<Entry>,
     /// Entries of each cache point: of `entries` or, with one stage, all vertices.
     count: usize,
-    /// For each cache point and entry, what it brings, and then the sum of what the entries up to it bring, over the whole: cumulative
-    /// probabilities. All zero where nothing is brought. Each row is filled up with ones to whole blocks.
+    /// For each cache point and entry the cumulative probability. All zero where no light arrives. Each row is filled up with ones to whole
+    /// blocks.
     cdf: Vec<Block>,
     /// For each cache point, the last of each block: where a search begins.
     ends: Vec<f32>,
-    /// For each entry, which cache points of the group it brings light to: a bit for each.
+    /// For each entry, the cache points of the group that it brings light to: a bit for each.
     seen: Vec<u16>,
-    /// For each cache point, what it found.
-    found: Vec<Found>,
+    /// For each cache point, the light that it found.
+    found: Vec<FoundLight>,
     ranges: Vec<Range<usize>>,
 }
 
@@ -89,7 +88,7 @@ impl Row<'_> {
 
 /// A choice among entries.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Choice {
+pub(super) struct Selection {
     /// Its number among the entries it was chosen from.
     pub entry: usize,
     /// Place of the light vertex in the store's order.
@@ -122,33 +121,33 @@ impl GroupPmf {
 
     /// Entry `e`, drawn with the probability `p` among all entries.
     #[inline]
-    fn choice(&self, e: usize, p: f32) -> Choice {
+    fn selection(&self, e: usize, p: f32) -> Selection {
         match self.entries.get(e) {
-            Some(entry) => Choice { entry: e, vertex: entry.vertex as usize, probability: p / entry.stands_for },
-            None => Choice { entry: e, vertex: e, probability: p },
+            Some(entry) => Selection { entry: e, vertex: entry.vertex as usize, probability: p / entry.inv_p1 },
+            None => Selection { entry: e, vertex: e, probability: p },
         }
     }
 
     /// The first stage: draws one vertex of each cluster of a cut.
     fn draw_entries(
         &mut self,
-        caches: &Caches,
+        caches: &CachePoints,
         group: &Range<usize>,
-        store: &LightStore,
+        store: &VertexStore,
         clusters: usize,
         rng: &mut HashRng,
         memory: &mut CutMemory,
     ) {
-        store.tree.cut(&caches.viewpoint(group), clusters, memory, &mut self.ranges);
+        store.tree.cut(&caches.receiver_bounds(group), clusters, memory, &mut self.ranges);
         self.entries.clear();
         self.entries.extend(self.ranges.iter().filter_map(|cluster| {
             let (vertex, p) = store.tree.draw(cluster, rng.next_f32())?;
-            Some(Entry { vertex: vertex as u32, stands_for: (1.0 / p) as f32 })
+            Some(Entry { vertex: vertex as u32, inv_p1: (1.0 / p) as f32 })
         }));
     }
 
-    /// The last stage: what every entry brings to every cache point of the group.
-    fn fill(&mut self, caches: &Caches, group: &Range<usize>, store: &LightStore, tracer: &mut Tracer) {
+    /// The last stage: the light that every entry brings to every cache point of the group.
+    fn fill(&mut self, caches: &CachePoints, group: &Range<usize>, store: &VertexStore, tracer: &mut Tracer) {
         self.first = group.start;
         let blocks = self.blocks();
         self.cdf.clear();
@@ -158,36 +157,8 @@ impl GroupPmf {
         self.seen.resize(self.count, 0);
         self.found.clear();
         self.found.resize(group.len(), [0.0; 3]);
-        let (points, sides) = (&caches.index.points()[group.clone()], &caches.index.normals()[group.clone()]);
         for e in 0..self.count {
-            let entry = self.entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, stands_for: 1.0 });
-            let y = store.vertex(entry.vertex as usize);
-            let (bsdf, end) = (store.bsdf(entry.vertex as usize), y.end());
-            let mut packet = SegmentPacket::default();
-            let mut asked = [(0usize, 0.0f32); PACKET];
-            for c in 0..group.len() {
-                let brings = y.brings(&bsdf, points[c], sides[c]);
-                self.found[c][1] += f64::from(brings.unscattered * entry.stands_for);
-                let scattered = brings.scattered * entry.stands_for;
-                if scattered > 0.0 && scattered.is_finite() {
-                    asked[packet.len] = (c, scattered);
-                    packet.push(&segment(caches.end(group.start + c), &end));
-                }
-            }
-            if packet.len == 0 {
-                continue;
-            }
-            let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
-            let seen = asked[..packet.len].iter().enumerate().filter(|(i, _)| blocked >> i & 1 == 0);
-            let by = seen.clone().fold(0u16, |by, (_, (c, _))| by | 1 << c);
-            self.seen[e] = by;
-            for (_, &(c, brings)) in seen {
-                self.cdf[c * blocks + e / BLOCK].0[e % BLOCK] = caches.aim(group.start + c, y.p, brings);
-                self.found[c][0] += f64::from(brings);
-                if caches.companions[group.start + c] & by == 0 {
-                    self.found[c][2] += f64::from(brings);
-                }
-            }
+            self.fill_entry(e, caches, group, store, tracer);
         }
         if self.count > 0 {
             for (cdf, found) in self.cdf.chunks_exact_mut(blocks).zip(&mut self.found) {
@@ -197,9 +168,51 @@ impl GroupPmf {
             }
         }
     }
+
+    /// The light that entry `e` brings to the cache points of the group, which a packet of shadow rays asks.
+    fn fill_entry(
+        &mut self,
+        e: usize,
+        caches: &CachePoints,
+        group: &Range<usize>,
+        store: &VertexStore,
+        tracer: &mut Tracer,
+    ) {
+        let blocks = self.blocks();
+        let (points, sides) = (&caches.index.points()[group.clone()], &caches.index.normals()[group.clone()]);
+        let entry = self.entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, inv_p1: 1.0 });
+        let y = store.vertex(entry.vertex as usize);
+        let (bsdf, end) = (store.bsdf(entry.vertex as usize), y.place.segment_end());
+        let mut packet = SegmentPacket::default();
+        let mut light = [(0usize, 0.0f32); PACKET];
+        for c in 0..group.len() {
+            let target = y.target_over_pdf(&bsdf, points[c], sides[c]);
+            self.found[c][1] += f64::from(target.first_stage * entry.inv_p1);
+            let full = target.full * entry.inv_p1; // [two-stage eq. 16, with S_j]
+            if full > 0.0 && full.is_finite() {
+                light[packet.len] = (c, full);
+                packet.push(&segment(caches.end(group.start + c), &end));
+            }
+        }
+        if packet.len == 0 {
+            return;
+        }
+        let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
+        let seen = light[..packet.len].iter().enumerate().filter(|(i, _)| blocked >> i & 1 == 0);
+        let seen_by = seen.clone().fold(0u16, |by, (_, (c, _))| by | 1 << c);
+        self.seen[e] = seen_by;
+        for (_, &(c, full)) in seen {
+            let weight = caches.pmf_weight(group.start + c, y.place.position(), full);
+            self.cdf[c * blocks + e / BLOCK].0[e % BLOCK] = weight;
+            self.found[c][0] += f64::from(full);
+            if caches.leave_one_out_neighbors[group.start + c] & seen_by == 0 {
+                self.found[c][2] += f64::from(full);
+            }
+        }
+    }
 }
 
-/// Turns what the first `count` entries bring into cumulative probabilities, which end in exactly one.
+/// Turns the weights of the first `count` entries into cumulative probabilities, which end in exactly one.
 fn accumulate(blocks: &mut [Block], count: usize) {
     let sum: f64 = blocks.iter().flat_map(|b| b.0).take(count).map(f64::from).sum();
     if sum > 0.0 {
@@ -212,53 +225,50 @@ fn accumulate(blocks: &mut [Block], count: usize) {
 }
 
 impl Pmfs {
-    /// Finds the probabilities of the vertices of `store`, of which `second_stage` asks for a first stage that leaves so many. `random`
-    /// is the seed and the number of the set.
+    /// Finds the pmfs of the vertices of `store`. `second_stage` is M₂, if there are two stages; the random numbers of the first stage are
+    /// those of the seed and of `set`.
     pub fn find(
         &mut self,
-        scene: &PreparedScene,
-        caches: &Caches,
-        store: &LightStore,
+        iteration: &Iteration,
+        caches: &CachePoints,
+        store: &VertexStore,
         second_stage: Option<usize>,
-        random: (u64, u64),
+        set: u64,
     ) -> RayStats {
         self.groups.resize_with(caches.groups.len(), GroupPmf::default);
-        if self.group_of.len() != caches.index.len() {
+        if self.group_of.len() != caches.len() {
             let number = |(g, range): (usize, &Range<usize>)| std::iter::repeat_n(g as u32, range.len());
             self.group_of = caches.groups.iter().enumerate().flat_map(number).collect();
         }
-        self.groups
-            .par_iter_mut()
-            .zip(&caches.groups)
-            .enumerate()
-            .map_init(CutMemory::default, |memory, (number, (pmf, group))| {
-                let mut tracer = Tracer::new(&*scene.query);
-                match second_stage {
-                    None => pmf.count = store.len(),
-                    Some(clusters) => {
-                        let mut rng = HashRng::new(random.0, FIRST_STAGE_STREAM, number as u64, random.1);
-                        pmf.draw_entries(caches, group, store, clusters, &mut rng, memory);
-                        pmf.count = pmf.entries.len();
-                    }
+        let of_group = |memory: &mut CutMemory, (number, (pmf, group)): (usize, (&mut GroupPmf, &Range<usize>))| {
+            let mut tracer = iteration.tracer();
+            match second_stage {
+                None => pmf.count = store.len(),
+                Some(clusters) => {
+                    let mut rng = HashRng::new(iteration.seed, streams::FIRST_STAGE, number as u64, set);
+                    pmf.draw_entries(caches, group, store, clusters, &mut rng, memory);
+                    pmf.count = pmf.entries.len();
                 }
-                pmf.fill(caches, group, store, &mut tracer);
-                tracer.stats
-            })
-            .reduce(RayStats::default, |mut a, b| {
-                a.merge(&b);
-                a
-            })
+            }
+            pmf.fill(caches, group, store, &mut tracer);
+            tracer.stats
+        };
+        let groups = self.groups.par_iter_mut().zip(&caches.groups).enumerate();
+        groups.map_init(CutMemory::default, of_group).reduce(RayStats::default, |mut a, b| {
+            a.merge(&b);
+            a
+        })
     }
 
-    /// For every cache point, what this iteration says of its normalisations.
-    pub fn found(&self) -> impl Iterator<Item = &Found> {
+    /// For every cache point, the light found in this iteration.
+    pub fn found(&self) -> impl Iterator<Item = &FoundLight> {
         self.groups.iter().flat_map(|g| &g.found)
     }
 
     /// Draws from the mixture of the probabilities at `n` cache points, all of one group if there are two stages, and an equal share of
     /// all entries; `None` if there are no entries. There is at least one cache point.
     #[inline]
-    pub fn draw(&self, caches: &[usize], u: [f32; 2]) -> Option<Choice> {
+    pub fn draw(&self, caches: &[usize], u: [f32; 2]) -> Option<Selection> {
         let group = &self.groups[*self.group_of.get(*caches.first()?)? as usize];
         let entries = group.count;
         if entries == 0 {
@@ -274,7 +284,7 @@ impl Pmfs {
         let chosen = ((u[0] * (n + 1) as f32) as usize).min(n);
         let e = match rows.get(chosen) {
             Some(Some(row)) if chosen < n => row.find(u[1]),
-            // A cache point that no light vertex reaches draws uniformly, as the last share does.
+            // A cache point that no light vertex reaches draws uniformly, as the last component of the mixture does.
             _ => (u[1] * entries as f32) as usize,
         }
         .min(entries - 1);
@@ -282,7 +292,7 @@ impl Pmfs {
         for row in &rows[..n] {
             p += share * row.map_or(uniform, |row| row.probability(e));
         }
-        Some(group.choice(e, p))
+        Some(group.selection(e, p))
     }
 
     /// Bit `i` set: entry `e`, from which cache points `near` choose, brings light to number `i` of them.
@@ -301,18 +311,18 @@ impl Pmfs {
     }
 
     /// Draws by the probabilities at one cache point alone; `None` if nothing is brought there.
-    pub fn draw_at(&self, cache: usize, u: f32) -> Option<Choice> {
+    pub fn draw_at(&self, cache: usize, u: f32) -> Option<Selection> {
         let group = self.group(cache)?;
         let row = group.row(cache)?;
         let e = row.find(u).min(group.count - 1);
-        Some(group.choice(e, row.probability(e)))
+        Some(group.selection(e, row.probability(e)))
     }
 
     /// Draws one of all entries of the cache point's group; `None` if there are none.
-    pub fn draw_uniformly(&self, cache: usize, u: f32) -> Option<Choice> {
+    pub fn draw_uniformly(&self, cache: usize, u: f32) -> Option<Selection> {
         let group = self.group(cache).filter(|group| group.count > 0)?;
         let e = ((u * group.count as f32) as usize).min(group.count - 1);
-        Some(group.choice(e, 1.0 / group.count as f32))
+        Some(group.selection(e, 1.0 / group.count as f32))
     }
 }
 

@@ -1,0 +1,70 @@
+//! Bidirectional methods as integrators: the engine of `bidir` behind the trait, and the settings that their parameters have in common.
+
+use super::{Integrator, Iteration, Params, Replay};
+use crate::bidir::allocation::combinations;
+use crate::bidir::{AllocationOptimizer, BidirSettings, Bidirectional, ConnectionStrategy, RayCosts};
+use crate::film::{Film, Pyramid};
+use crate::mis::{Heuristic, Techniques};
+use crate::path::PathLimits;
+use crate::ray::RayStats;
+
+/// The settings that all bidirectional methods have parameters for, with the balance heuristic.
+pub fn settings(params: &Params, techniques: Techniques) -> BidirSettings {
+    let limits = PathLimits {
+        max_edges: u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX),
+        rr_depth: params.int("rr_depth") as u32,
+        rr_scale: 1.0,
+    };
+    BidirSettings {
+        techniques,
+        heuristic: Heuristic::Balance,
+        eye_limits: limits,
+        light_limits: limits,
+        hide_emitters: params.bool("hide_emitters"),
+    }
+}
+
+/// [`settings`] of methods that draw connections from many light sub-paths, where eye sub-paths may end sooner at Lambertian surfaces.
+pub fn resampled_settings(params: &Params, techniques: Techniques) -> BidirSettings {
+    let mut settings = settings(params, techniques);
+    // By way of percent, so that the rounding is that of checkpoints and pictures that exist.
+    settings.eye_limits.rr_scale = (params.float("rr_scale") * 100.0) as f32 * 0.01;
+    settings
+}
+
+/// Decides the allocation of a method that draws connections from many light sub-paths, if the parameters ask for it.
+pub fn optimizer(params: &Params) -> Option<AllocationOptimizer> {
+    let candidates = || combinations(&[1.0, 0.25, 0.0625, 0.015_625], &[1.0, 0.5, 0.25, 0.125, 0.0625]);
+    (params.choice("allocation") == "auto").then(|| AllocationOptimizer::new(candidates(), RayCosts::SHARED_SUBPATHS))
+}
+
+impl<S: ConnectionStrategy> Integrator for Bidirectional<S> {
+    fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
+        Bidirectional::iterate(self, iteration, film)
+    }
+
+    fn state(&self) -> Vec<u8> {
+        self.save()
+    }
+
+    fn restore(&mut self, iteration: &Iteration, state: &[u8]) -> bool {
+        Bidirectional::restore(self, iteration, state)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        Bidirectional::notes(self)
+    }
+
+    fn keep_pyramid(&mut self, window: [u32; 4], max_edges: usize) -> bool {
+        Bidirectional::keep_pyramid(self, window, max_edges);
+        true
+    }
+
+    fn pyramid(&self) -> Option<&Pyramid> {
+        Bidirectional::pyramid(self)
+    }
+
+    fn replay(&mut self, iteration: &Iteration, pixel: (u32, u32)) -> Replay {
+        Bidirectional::replay(self, iteration, pixel)
+    }
+}

@@ -1,0 +1,217 @@
+//! The weights of a path by their definition: all densities of all its vertices from both ends, multiplied up in double
+//! precision logarithms (Veach 1997, §10.2). It is the oracle of [`MisContext::weight`], and explains single samples.
+
+use super::factor::{ConnectionFactor, IncidentSubpath, ResamplingTarget};
+use super::{Heuristic, MisContext};
+use crate::emit::LightEnd;
+use crate::math::measure::spread;
+use crate::math::{Rgb, Vec3};
+use crate::path::{DirectionSampler, FullPath, Interior};
+use crate::prepared::PreparedScene;
+use crate::shade::Transport;
+
+/// Densities of the vertices v_0 … v_k of a path.
+#[derive(Clone, Debug)]
+pub struct PathPdfs {
+    /// p_L(v_i), from the light's end, survival of roulette included, for i < k.
+    pub light: Vec<f64>,
+    /// p_E(v_i), from the lens's end.
+    pub eye: Vec<f64>,
+    /// Whether the edge v_{i−1} v_i can be a connection, for i = 1 … k; and for i = 0, whether a ray can meet the light by chance.
+    pub connectable: Vec<bool>,
+    /// c_1, see `mis::weight`.
+    pub next_event: f64,
+    /// c_s of connections with s ≥ 2 and t ≥ 2, see `mis::factor`; 1 elsewhere.
+    pub connection_factors: Vec<f64>,
+}
+
+/// Two neighbouring vertices of a path, of which the first could have been the last of a resampled light sub-path, and the second the eye
+/// vertex that it was connected to.
+#[derive(Clone, Copy, Debug)]
+pub struct AdjacentVertices<'a> {
+    /// The one nearer to the light, y_{s−1}.
+    pub y: &'a Interior,
+    /// Unit direction from `y` to the vertex before it.
+    pub wo: Vec3,
+    /// The one nearer to the lens.
+    pub z: &'a Interior,
+    /// Unit direction from `y` to `z`.
+    pub wi: Vec3,
+    /// The light sub-path that ends at `y`, as `z` sees it.
+    pub light: IncidentSubpath,
+}
+
+/// The connection factor of two adjacent vertices, as the method knows it.
+pub type FactorOf<'a> = &'a dyn Fn(&AdjacentVertices) -> f32;
+
+/// A path with the rules that its sub-paths follow.
+struct PathView<'a, F> {
+    scene: &'a PreparedScene,
+    mis: &'a MisContext<F>,
+    path: &'a FullPath,
+}
+
+impl<F: ConnectionFactor> PathView<'_, F> {
+    /// Turns a density per steradian at a neighbour of v_i into v_i's own measure, along the edge `e`.
+    fn area_jacobian(&self, i: usize, e: usize) -> f64 {
+        let (d, distance) = self.path.edge(e);
+        match i {
+            0 => match self.path.origin.end {
+                LightEnd::Surface { ng, .. } => f64::from(spread(ng.dot(d), distance * distance)),
+                LightEnd::Point { .. } => f64::from(distance).powi(-2),
+                LightEnd::Infinite => 1.0,
+            },
+            _ => f64::from(spread(self.path.interior[i - 1].point.ng.dot(d), distance * distance)),
+        }
+    }
+
+    /// Density per steradian at the interior vertex v_i of the direction `to`, coming from `from`; survival included.
+    fn scatter_pdf(&self, i: usize, from: Vec3, to: Vec3, mode: Transport) -> f64 {
+        let v = &self.path.interior[i - 1];
+        let (number, limits, delta) = match mode {
+            Transport::Importance => (i, &self.mis.light_limits, 0),
+            Transport::Radiance => (self.path.edges() - i, &self.mis.eye_limits, 1),
+        };
+        let survival = limits.survival(number as u32, &v.scatter());
+        let pdf = match v.delta {
+            Some((pdfs, _)) => pdfs[delta],
+            None => self.mis.directions.pdf(v.point.p, &v.bsdf, from, to, mode),
+        };
+        f64::from(pdf.0) * f64::from(survival)
+    }
+
+    /// p_L(v_i), i = 0 … k − 1.
+    fn light_pdfs(&self) -> Vec<f64> {
+        let path = self.path;
+        let light = self.scene.lights.get(path.origin.light);
+        let chosen = f64::from(self.scene.lights.pmf(path.origin.light).0);
+        let (position, direction) = light.pdf_emission_given_vertex(path.origin.direction);
+        let (position, direction) = (f64::from(position.0), f64::from(direction.0));
+        let infinite = light.is_infinite();
+        let mut pdfs = vec![chosen * if infinite { direction } else { position }];
+        for i in 1..path.edges() {
+            pdfs.push(match i {
+                1 if infinite => position * f64::from(path.interior[0].point.ng.dot(path.origin.direction).abs()),
+                1 => direction * self.area_jacobian(1, 0),
+                _ => {
+                    let (from, to) = (-path.edge(i - 2).0, path.edge(i - 1).0);
+                    self.scatter_pdf(i - 1, from, to, Transport::Importance) * self.area_jacobian(i, i - 1)
+                }
+            });
+        }
+        pdfs
+    }
+
+    /// p_E(v_i), i = 0 … k.
+    fn eye_pdfs(&self) -> Vec<f64> {
+        let (path, k) = (self.path, self.path.edges());
+        let (lens, direction) = self.scene.camera.pdf_sampled_ray(-path.edge(k - 1).0);
+        let mut pdfs = vec![0.0; k + 1];
+        pdfs[k] = f64::from(lens.0);
+        pdfs[k - 1] = f64::from(direction.0) * self.area_jacobian(k - 1, k - 1);
+        for i in (0..k - 1).rev() {
+            let (from, to) = (path.edge(i + 1).0, -path.edge(i).0);
+            pdfs[i] = self.scatter_pdf(i + 1, from, to, Transport::Radiance) * self.area_jacobian(i, i);
+        }
+        pdfs
+    }
+
+    /// c_1; `origin` is p_L(v_0).
+    fn next_event(&self, origin: f64) -> f64 {
+        let path = self.path;
+        let light = self.scene.lights.get(path.origin.light);
+        path.interior.first().map_or(1.0, |v| {
+            let chosen = self.scene.lights.pmf_from(v.point.p, v.light_choice_normal, path.origin.light);
+            if light.is_delta() {
+                return f64::from(chosen.0) / f64::from(self.scene.lights.pmf(path.origin.light).0);
+            }
+            let (d, distance) = path.edge(0);
+            let direct = f64::from(light.pdf_direct(v.point.p, -d, distance).0);
+            f64::from(chosen.0) * direct * self.area_jacobian(0, 0) / origin
+        })
+    }
+
+    /// c_s of every connection.
+    fn connection_factors(&self, factor_of: FactorOf) -> Vec<f64> {
+        let (path, k) = (self.path, self.path.edges());
+        let mut factors = vec![1.0; k + 1];
+        if F::IS_ONE {
+            return factors;
+        }
+        // β_L as a light sub-path has it on arriving at v_{i−1}.
+        let mut throughput = path.origin.throughput.to_array().map(f64::from);
+        for (i, factor) in factors.iter_mut().enumerate().take(k).skip(2) {
+            let v = &path.interior[i - 2];
+            let (wo, wi) = (-path.edge(i - 2).0, path.edge(i - 1).0);
+            let value = v.delta.map_or_else(|| v.bsdf.eval(wo, wi, Transport::Importance), |(_, value)| value);
+            let scattered: [f64; 3] = std::array::from_fn(|c| throughput[c] * f64::from(value[c]));
+            let jacobian = self.area_jacobian(i, i - 1);
+            let luminance = |light: [f64; 3]| Rgb::from(light.map(|v| (v * jacobian) as f32)).luminance();
+            let target_over_pdf = ResamplingTarget {
+                full: luminance(scattered),
+                first_stage: luminance(throughput) * v.point.ng.dot(wi).abs(),
+            };
+            let light = IncidentSubpath {
+                s: i,
+                throughput: Rgb::from(throughput.map(|v| v as f32)),
+                target_over_pdf,
+                distance2: path.edge(i - 1).1.powi(2),
+            };
+            *factor = f64::from(factor_of(&AdjacentVertices { y: v, wo, z: &path.interior[i - 1], wi, light }));
+            throughput = scattered.map(|v| v / self.scatter_pdf(i - 1, wo, wi, Transport::Importance));
+        }
+        factors
+    }
+}
+
+impl PathPdfs {
+    /// Densities of `path` where sub-paths follow the rules of `mis`; `factor_of` is c of connections.
+    pub fn new<F: ConnectionFactor>(
+        scene: &PreparedScene,
+        mis: &MisContext<F>,
+        factor_of: FactorOf,
+        path: &FullPath,
+    ) -> PathPdfs {
+        let view = PathView { scene, mis, path };
+        let k = path.edges();
+        let smooth = |i: usize| i == 0 || i == k || path.interior[i - 1].delta.is_none();
+        let can_be_hit = !scene.lights.get(path.origin.light).is_delta();
+        let light = view.light_pdfs();
+        PathPdfs {
+            next_event: view.next_event(light[0]),
+            light,
+            eye: view.eye_pdfs(),
+            connectable: (0..=k).map(|i| if i == 0 { can_be_hit } else { smooth(i - 1) && smooth(i) }).collect(),
+            connection_factors: view.connection_factors(factor_of),
+        }
+    }
+
+    /// ln of n_s c_s p_s for every technique (s, k + 1 − s), s = 0 … k; −∞ for those that cannot make the path.
+    pub fn log_effective_pdfs<F>(&self, mis: &MisContext<F>) -> Vec<f64> {
+        let k = self.eye.len() - 1;
+        (0..=k)
+            .map(|s| {
+                let n = f64::from(mis.techniques.count(s, k + 1 - s));
+                let c = if s == 1 && k >= 2 { self.next_event } else { self.connection_factors[s] };
+                let possible = if self.connectable[s] { 1.0 } else { 0.0 };
+                let light: f64 = self.light[..s].iter().map(|p| p.ln()).sum();
+                // p_E(v_0) of a light that cannot be hit belongs to an impossible technique alone.
+                let eye: f64 = if possible > 0.0 { self.eye[s..].iter().map(|p| p.ln()).sum() } else { 0.0 };
+                (n * c * possible).ln() + light + eye
+            })
+            .collect()
+    }
+
+    /// The weight of every technique (s, k + 1 − s), s = 0 … k.
+    pub fn weights<F>(&self, mis: &MisContext<F>) -> Vec<f64> {
+        let logs = self.log_effective_pdfs(mis);
+        let beta = match mis.heuristic {
+            Heuristic::Balance => 1.0,
+            Heuristic::Power => 2.0,
+        };
+        let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let terms: Vec<f64> = logs.iter().map(|l| (beta * (l - top)).exp()).collect();
+        let sum: f64 = terms.iter().sum();
+        terms.iter().map(|x| if *x > 0.0 { x / sum } else { 0.0 }).collect() // [Veach eq. 9.8]
+    }
+}
