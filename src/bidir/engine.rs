@@ -129,9 +129,15 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
             Some(_) => Some(1),
             None => self.optimizer.as_ref().and_then(|o| o.probe_stride(index, pixels)),
         });
-        self.mis.techniques.set_connections(self.strategy.samples() * self.allocation.connections);
         let light_paths = self.light_paths(iteration);
         self.mis.techniques.set_light_paths(light_paths);
+        self.ask_strategy();
+    }
+
+    /// Takes over the strategy's number of samples and its connection factor.
+    fn ask_strategy(&mut self) {
+        self.mis.techniques.set_connections(self.strategy.samples() * self.allocation.connections);
+        self.mis.factor = self.strategy.factor();
     }
 
     /// Lets the strategy place its cache points, once; they are functions of scene and seed alone.
@@ -153,7 +159,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
             LightSubpaths::Shared { count, tree } if self.draws_stored() => (count, tree),
             _ => (0, false),
         };
-        self.mis.factor = self.strategy.factor();
+        self.ask_strategy();
         let mut store = std::mem::take(&mut self.store);
         output.add(phases.time("light paths", || self.light_pass(iteration, count, &mut store)));
         phases.time("light tree", || store.finish(count, tree));
