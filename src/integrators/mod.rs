@@ -6,6 +6,7 @@ pub mod bdpt;
 pub mod bidirectional;
 pub mod importance;
 pub mod light;
+pub mod lvc;
 pub mod params;
 pub mod path;
 pub mod resampling;
@@ -23,6 +24,7 @@ pub static REGISTRY: &[&IntegratorSpec] = &[
     &path::SPEC,
     &light::SPEC,
     &bdpt::SPEC,
+    &lvc::SPEC,
     &resampling::PCBPT,
     &resampling::RIS,
     &resampling::TWO_STAGE,
