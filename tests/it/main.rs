@@ -6,6 +6,7 @@ mod architecture;
 mod bad_input;
 mod cli;
 mod cli_techniques;
+mod factors;
 mod furnace;
 mod image_metrics;
 mod images;
