@@ -1,7 +1,7 @@
 //! Emitters as an eye sub-path meets them: next event (s = 1) and hits (s = 0), for path tracing and all bidirectional methods.
 
 use crate::emit::{DirectSample, Light, LightId};
-use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::sampler::{PathSampler, SampleSlot};
 use crate::math::{Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::path::{DirectionSampler, Edge, Place, Vertex};
 use crate::prepared::PreparedScene;
@@ -10,7 +10,7 @@ use crate::shade::Transport;
 /// The normal by which a light is chosen at a vertex; none where the choice does not depend on the vertex.
 #[inline]
 pub fn light_choice_normal(scene: &PreparedScene, vertex: &Vertex) -> Option<Vec3> {
-    if scene.lights.choice_depends_on_place() { vertex.light_choice_normal() } else { None }
+    if scene.lights.uses_light_tree() { vertex.light_choice_normal() } else { None }
 }
 
 /// Draws a light and a point of it as seen from `vertex`, whose light choice normal is `normal`, and hands them over with the probability
@@ -23,9 +23,9 @@ pub fn sample_direct(
     sampler: &mut PathSampler,
     mut drawn: impl FnMut(LightId, Pmf, &DirectSample),
 ) {
-    let u = sampler.vertex(vertex.index, Purpose::Emitter);
+    let u = sampler.vertex(vertex.index, SampleSlot::Emitter);
     let p = vertex.position();
-    let Some((id, pmf)) = scene.lights.pick_from(p, normal, u[0]) else { return };
+    let Some((id, pmf)) = scene.lights.sample_light_from(p, normal, u[0]) else { return };
     // Two copies of the caller's code: the sample of a triangle, by far the most common, stays in registers; others go through memory.
     match scene.lights.get(id) {
         Light::Triangle(light) => {
@@ -102,5 +102,5 @@ pub fn next_event_pdf(
     direction: Vec3,
 ) -> SolidAnglePdf {
     let lights = &scene.lights;
-    lights.get(id).pdf_direct(edge.from, direction, edge.distance) * lights.pmf_from(edge.from, normal, id)
+    lights.get(id).pdf_direct(edge.from, direction, edge.distance) * lights.pmf_light_from(edge.from, normal, id)
 }

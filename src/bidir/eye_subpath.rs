@@ -9,7 +9,7 @@ use super::replay::{ContributionRecord, Replay, SubpathKind};
 use super::scratch::{ContributionSink, EyeQueues};
 use super::store::VertexStore;
 use super::strategy::{ConnectionStrategy, EyeVertex, factor_of};
-use crate::emit::{DirectSample, LightEnd, LightId};
+use crate::emit::{DirectSample, EmitterVertex, LightId};
 use crate::math::sampler::PathSampler;
 use crate::math::{AreaPdf, Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::{
@@ -74,7 +74,7 @@ pub(super) enum PathOrigin {
 /// A hit of a light.
 struct EmitterHit<'a> {
     light: LightId,
-    end: LightEnd,
+    end: EmitterVertex,
     /// Unit direction from the vertex before to the light.
     direction: Vec3,
     throughput: Rgb,
@@ -129,9 +129,9 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
             return;
         }
         let light = scene.lights.get(id);
-        let chosen = scene.lights.pmf(id);
+        let chosen = scene.lights.pmf_light(id);
         let (position, emission) = light.pdf_emission(-direction);
-        let origin_pdf = end.vertex_density(position, emission) * chosen;
+        let origin_pdf = end.pdf_vertex(position, emission) * chosen;
         let drawn = position.0 * emission.0 * chosen.0;
         let origin = Origin {
             light: id,
@@ -152,7 +152,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
             light: &[],
             light_end: EndpointPdfs::NONE,
             eye: self.pdfs.pdfs.all(),
-            eye_end: EndpointPdfs { pdf_rev: origin_pdf, pdf_rev_prev: end.departure(position, emission) },
+            eye_end: EndpointPdfs { pdf_rev: origin_pdf, pdf_rev_prev: end.pdf_emission_dir(position, emission) },
             emitter: EmitterFactors { can_be_hit: true, next_event },
             connection_factor: 1.0,
             // No connection ends at the light.
@@ -179,8 +179,8 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
             return;
         }
         let light = scene.lights.get(id);
-        let (position, emission) = light.pdf_emission_given_sample(sample);
-        let origin_pmf = scene.lights.pmf(id);
+        let (position, emission) = light.pdf_emission_at_sample(sample);
+        let origin_pmf = scene.lights.pmf_light(id);
         let drawn = position.0 * emission.0 * origin_pmf.0;
         let origin = Origin {
             light: id,
@@ -215,8 +215,8 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         let (cos, dist2) = (place.cosine(sample.wi), sample.distance * sample.distance);
         let (position, emission) = *emission;
         // Per steradian at the eye vertex → per unit area at the light vertex.
-        let area_jacobian = sample.end.spread(sample.wi, dist2);
-        let origin_pdf = sample.end.vertex_density(position, emission) * *origin_pmf;
+        let area_jacobian = sample.end.area_jacobian(sample.wi, dist2);
+        let origin_pdf = sample.end.pdf_vertex(position, emission) * *origin_pmf;
         let walked = light.scatter_pdf.0 * mis.eye_limits.survival(vertex.index, &vertex.scatter);
         let (value, pdf_rev_prev) = self.reverse_scatter(vertex, sample.wi);
         let edge = self.edge_before(vertex, sample.wi);
@@ -227,7 +227,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
                 pdf_rev_prev: SolidAnglePdf(0.0),
             },
             eye: self.pdfs.pdfs.first(t),
-            eye_end: EndpointPdfs { pdf_rev: sample.end.next_density(position, emission, cos, dist2), pdf_rev_prev },
+            eye_end: EndpointPdfs { pdf_rev: sample.end.pdf_next_vertex(position, emission, cos, dist2), pdf_rev_prev },
             emitter: EmitterFactors {
                 can_be_hit: !is_delta,
                 next_event: next_event_factor(light.pdf, area_jacobian, origin_pdf),
@@ -345,7 +345,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> WalkHooks for EyeHooks<'_, S, K
     fn escaped(&mut self, _index: u32, direction: Vec3, throughput: Rgb, edge: &Edge) {
         self.pdfs.arrive_at_infinity(edge);
         for_each_background(self.rules.iteration.scene, direction, |light, emitted| {
-            self.hit(&EmitterHit { light, end: LightEnd::Infinite, direction, throughput, emitted, edge });
+            self.hit(&EmitterHit { light, end: EmitterVertex::Infinite, direction, throughput, emitted, edge });
         });
     }
 }

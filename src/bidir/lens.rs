@@ -4,9 +4,9 @@ use super::contribution::Contribution;
 use super::light_subpath::LightHooks;
 use super::replay::ContributionRecord;
 use super::strategy::{ConnectionStrategy, factor_of};
-use crate::emit::{LensSample, LightEnd};
-use crate::math::measure::spread;
-use crate::math::sampler::{PathSampler, Purpose};
+use crate::emit::{EmitterVertex, LensSample};
+use crate::math::measure::area_jacobian;
+use crate::math::sampler::{PathSampler, SampleSlot};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::mis::{
     AdjacentVertices, ConnectedPath, ConnectionFactor, EndpointPdfs, MisWeight, ReversePath, ReverseTransport,
@@ -75,7 +75,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
         }
         let (scene, emission) = (self.rules.scene, self.emission);
         let sample = match emission.end {
-            LightEnd::Infinite => scene.camera.sample_lens_at_infinity(-emission.direction, u),
+            EmitterVertex::Infinite => scene.camera.sample_lens_at_infinity(-emission.direction, u),
             _ => scene.camera.sample_lens(emission.origin, u),
         };
         let Some(lens) = sample else { return };
@@ -89,7 +89,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
                 let cos = ng.dot(lens.wi).max(0.0);
                 // The radiance of a textured light is the same in all directions of its front.
                 let emitted = if cos > 0.0 { emission.radiance } else { Rgb::BLACK };
-                let jacobian = spread(cos, lens.distance * lens.distance);
+                let jacobian = area_jacobian(cos, lens.distance * lens.distance);
                 (emitted, cos, jacobian, segment(&from, &SegmentEnd::Free(lens.p_near)))
             }
         };
@@ -106,7 +106,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
     /// (s, 1): a vertex as the lens sees it.
     pub(super) fn vertex_to_lens(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) {
         let s = vertex.index as usize + 1;
-        let u = sampler.vertex(vertex.index, Purpose::Emitter);
+        let u = sampler.vertex(vertex.index, SampleSlot::Emitter);
         let p = vertex.position();
         let Some(lens) = self.rules.scene.camera.sample_lens(p, [u[0], u[1]]) else { return };
         let value = crate::path::Scattering::eval(&vertex.scatter, vertex.wo, lens.wi, Transport::Importance);

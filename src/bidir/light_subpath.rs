@@ -5,7 +5,7 @@ use super::replay::{Replay, SubpathKind};
 use super::scratch::SplatQueue;
 use super::strategy::ConnectionStrategy;
 use super::vertex::LightVertex;
-use crate::emit::{EmissionSample, LightEnd, LightId};
+use crate::emit::{EmissionSample, EmitterVertex, LightId};
 use crate::math::sampler::PathSampler;
 use crate::math::{AreaPdf, Pmf, Rgb, Vec3};
 use crate::mis::{
@@ -79,10 +79,10 @@ impl<S: ConnectionStrategy> LightSubpathTracer<'_, S> {
         out.clear();
         let u = sampler.origin();
         let v = sampler.origin_direction();
-        let Some((id, chosen)) = self.scene.lights.pick(u[0]) else { return };
+        let Some((id, chosen)) = self.scene.lights.sample_light(u[0]) else { return };
         let light = self.scene.lights.get(id);
         let Some(emission) = light.sample_emission([u[1], u[2]], [v[0], v[1]]) else { return };
-        out.pdfs.begin(emission.vertex_density() * chosen);
+        out.pdfs.begin(emission.pdf_vertex() * chosen);
         out.emitter = EmitterFactors { can_be_hit: !light.is_delta(), next_event: 0.0 };
         self.mis.accumulate_partial_sums(out.pdfs.all_mut(), PathEnd::Light(out.emitter));
         let throughput = emission.flux() * (1.0 / chosen.0);
@@ -158,13 +158,13 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
     /// per unit area at the light.
     fn next_event_factor(&self, vertex: &Vertex, area_jacobian: f32) -> f32 {
         let (scene, p) = (self.rules.scene, vertex.position());
-        let chosen = scene.lights.pmf_from(p, light_choice_normal(scene, vertex), self.id);
+        let chosen = scene.lights.pmf_light_from(p, light_choice_normal(scene, vertex), self.id);
         let light = scene.lights.get(self.id);
         if light.is_delta() {
             return chosen.0 / self.chosen.0;
         }
         let distance = match self.emission.end {
-            LightEnd::Infinite => f32::INFINITY,
+            EmitterVertex::Infinite => f32::INFINITY,
             _ => vertex.edge.distance,
         };
         let direct = light.pdf_direct(p, vertex.wo, distance) * chosen;
@@ -177,8 +177,8 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
         if vertex.index == 1 {
             let (emission, dist2) = (self.emission, vertex.edge.distance * vertex.edge.distance);
             let cos = vertex.place.cosine(vertex.wo);
-            let pdf_fwd = emission.end.next_density(emission.pdf_position, emission.pdf_direction, cos, dist2);
-            let to_light = emission.end.spread(emission.direction, dist2);
+            let pdf_fwd = emission.end.pdf_next_vertex(emission.pdf_position, emission.pdf_direction, cos, dist2);
+            let to_light = emission.end.area_jacobian(emission.direction, dist2);
             self.out.pdfs.arrive_with(pdf_fwd, to_light, eye_survival);
             self.out.emitter.next_event = self.next_event_factor(vertex, to_light);
         } else {

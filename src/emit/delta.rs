@@ -1,6 +1,6 @@
 //! Lights without extent: point, spot, directional.
 
-use super::sample::{DirectSample, EmissionSample, LightEnd};
+use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::{EmitError, in_range};
 use crate::math::warp::{SPHERE_PDF, cone_pdf, square_to_cone, square_to_sphere};
 use crate::math::{AreaPdf, DMat4, DVec3, Frame, Rgb, SolidAnglePdf, Vec3};
@@ -30,7 +30,7 @@ fn direct_from_point(position: Vec3, from: Vec3, intensity: impl Fn(Vec3) -> Rgb
     Some(DirectSample {
         wi,
         distance,
-        end: LightEnd::Point { p: position },
+        end: EmitterVertex::Point { p: position },
         radiance,
         pdf: SolidAnglePdf(1.0),
         delta: true,
@@ -49,7 +49,7 @@ fn emission_from_point(position: Vec3, direction: Vec3, radiance: Rgb, pdf: Soli
         pdf_direction: pdf,
         delta_position: true,
         delta_direction: false,
-        end: LightEnd::Point { p: position },
+        end: EmitterVertex::Point { p: position },
     }
 }
 
@@ -200,7 +200,7 @@ impl DirectionalLight {
         (!self.irradiance.is_black()).then_some(DirectSample {
             wi: -self.direction,
             distance: f32::INFINITY,
-            end: LightEnd::Infinite,
+            end: EmitterVertex::Infinite,
             radiance: self.irradiance,
             pdf: SolidAnglePdf(1.0),
             delta: true,
@@ -219,7 +219,7 @@ impl DirectionalLight {
             pdf_direction: SolidAnglePdf(1.0),
             delta_position: false,
             delta_direction: true,
-            end: LightEnd::Infinite,
+            end: EmitterVertex::Infinite,
         }
     }
 

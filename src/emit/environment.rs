@@ -1,7 +1,7 @@
 //! Radiance from beyond the scene, in every direction.
 
 use super::envmap::EnvMap;
-use super::sample::{DirectSample, EmissionSample, LightEnd};
+use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::sunsky::SunSky;
 use crate::math::warp::{SPHERE_PDF, square_to_disk, square_to_sphere};
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec3};
@@ -109,7 +109,7 @@ impl EnvironmentLight {
         (!radiance.is_black() && pdf.0 > 0.0 && pdf.0.is_finite()).then_some(DirectSample {
             wi,
             distance: f32::INFINITY,
-            end: LightEnd::Infinite,
+            end: EmitterVertex::Infinite,
             radiance,
             pdf,
             delta: false,
@@ -135,7 +135,7 @@ impl EnvironmentLight {
             pdf_direction: direct.pdf,
             delta_position: false,
             delta_direction: false,
-            end: LightEnd::Infinite,
+            end: EmitterVertex::Infinite,
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::delta::{DirectionalLight, PointLight, SpotLight};
 use super::environment::EnvironmentLight;
-use super::sample::{DirectSample, EmissionSample, LightEnd};
+use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::triangle::TriangleLight;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 
@@ -81,10 +81,9 @@ impl Light {
         }
     }
 
-    /// Densities of the emission ray in the direction `wo` for a light vertex that was drawn by [`Light::sample_direct`]: as
-    /// [`Light::pdf_emission`], but a delta factor counts as 1, which is what a weight needs when the vertex is on the delta
-    /// light by construction.
-    pub fn pdf_emission_given_vertex(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
+    /// Densities of the emission ray in the direction `wo` from a vertex that is on the light by construction, as those of
+    /// [`Light::sample_direct`] are: [`Light::pdf_emission`] with delta factors counted as 1, as MIS weights need them.
+    pub fn pdf_emission_at_vertex(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
         match self {
             Light::Point(l) => (AreaPdf(1.0), l.pdf_direction()),
             Light::Spot(l) => (AreaPdf(1.0), l.pdf_direction(wo)),
@@ -93,17 +92,17 @@ impl Light {
         }
     }
 
-    /// [`Light::pdf_emission_given_vertex`] of the ray back along `sample`, which [`Light::sample_direct`] drew. An environment is seen
-    /// alike from everywhere, so that its density is known already.
+    /// [`Light::pdf_emission_at_vertex`] of the ray that runs back along `sample`, a result of [`Light::sample_direct`]. Of an
+    /// environment the density of the direction is taken from the sample, which saves a look-up in the environment map.
     #[inline]
-    pub fn pdf_emission_given_sample(&self, sample: &DirectSample) -> (AreaPdf, SolidAnglePdf) {
+    pub fn pdf_emission_at_sample(&self, sample: &DirectSample) -> (AreaPdf, SolidAnglePdf) {
         match self {
             Light::Environment(l) => (l.pdf_position(), sample.pdf),
-            _ => self.pdf_emission_given_vertex(-sample.wi),
+            _ => self.pdf_emission_at_vertex(-sample.wi),
         }
     }
 
-    /// Luminance of the emitted flux: the weight of the light when one is chosen. Positive wherever light is emitted.
+    /// Luminance of the emitted flux: the weight of the light when one is sampled by power. Positive wherever light is emitted.
     pub fn power(&self) -> f32 {
         match self {
             Light::Triangle(l) => l.power(),
@@ -114,34 +113,34 @@ impl Light {
         }
     }
 
-    /// The light is beyond the scene; rays that escape may see it.
+    /// True if the light is at infinity: rays that escape from the scene may see it.
     pub fn is_infinite(&self) -> bool {
         matches!(self, Light::Directional(_) | Light::Environment(_))
     }
 
-    /// No ray meets the light by chance.
+    /// True if no ray meets the light by chance.
     pub fn is_delta(&self) -> bool {
         self.delta_position() || self.delta_direction()
     }
 
-    /// The light is a point in space.
+    /// True if the light is a point in space.
     pub fn delta_position(&self) -> bool {
         matches!(self, Light::Point(_) | Light::Spot(_))
     }
 
-    /// The light has one direction.
+    /// True if the light emits in one direction only.
     pub fn delta_direction(&self) -> bool {
         matches!(self, Light::Directional(_))
     }
 
-    /// The light end of a segment for a ray that met the light at `p` (any value for lights at infinity), with the error bound
-    /// that the caller knows for its hit.
-    pub fn end_at(&self, p: Vec3, error: f32) -> LightEnd {
+    /// The light vertex of a ray that met the light at `p` (any value for lights at infinity); `error` bounds the rounding error of any
+    /// component of `p`.
+    pub fn end_at(&self, p: Vec3, error: f32) -> EmitterVertex {
         match self {
-            Light::Triangle(l) => LightEnd::Surface { p, error, ng: l.ng() },
-            Light::Point(l) => LightEnd::Point { p: l.position() },
-            Light::Spot(l) => LightEnd::Point { p: l.position() },
-            Light::Directional(_) | Light::Environment(_) => LightEnd::Infinite,
+            Light::Triangle(l) => EmitterVertex::Surface { p, error, ng: l.ng() },
+            Light::Point(l) => EmitterVertex::Point { p: l.position() },
+            Light::Spot(l) => EmitterVertex::Point { p: l.position() },
+            Light::Directional(_) | Light::Environment(_) => EmitterVertex::Infinite,
         }
     }
 }

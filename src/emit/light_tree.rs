@@ -324,7 +324,7 @@ impl LightTree {
         low
     }
 
-    /// Draws a light for the point `p`; see [`super::LightSet::pick_from`]. `None` for an empty tree.
+    /// Draws a light for the point `p`; see [`super::LightSet::sample_light_from`]. `None` for an empty tree.
     pub fn sample(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(u32, Pmf)> {
         let (mut node, mut lane, mut pmf) = (self.nodes.first()?, 0, 1.0);
         let mut u = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON));

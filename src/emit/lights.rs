@@ -1,8 +1,8 @@
-//! All lights of a scene, and the choice of one.
+//! All lights of a scene, and the sampling of one.
 //!
-//! Light sub-paths choose in proportion to power. Direct light chooses for the point that is lit: lights with a position through a
-//! [`LightTree`] when there are more than a handful, lights at infinity with a share of their own, since their power (it grows with
-//! the scene's size) says nothing about what arrives at a point.
+//! Light sub-paths sample a light in proportion to power. Direct light samples one for the point that is lit: lights with a position by a
+//! [`LightTree`] when there are more than [`LIGHT_TREE_MIN`], lights at infinity with a probability of their own, since their power (it
+//! grows with the scene's size) does not tell how much arrives at a point.
 
 use super::light::Light;
 use super::light_tree::LightTree;
@@ -29,18 +29,18 @@ pub struct LightSet {
     direct: Option<Direct>,
 }
 
-/// Choice for a point, where it differs from the choice by power.
+/// Probabilities for a lit point, where they differ from those by power.
 #[derive(Debug)]
 struct Direct {
     tree: LightTree,
-    /// Probability of choosing among the lights at infinity.
+    /// Probability of sampling one of the lights at infinity.
     infinite_share: f32,
-    /// By power among all lights, those with a position having none.
+    /// Lights at infinity by power; the probability of all other lights is zero.
     infinite: Cdf,
 }
 
-/// Up to this many lights with a position are chosen by power alone.
-const HANDFUL: usize = 4;
+/// Up to so many lights with a position are sampled by power alone, if none is at infinity.
+const LIGHT_TREE_MIN: usize = 4;
 
 impl Direct {
     fn new(lights: &[Light], powers: &[f32]) -> Option<Direct> {
@@ -48,7 +48,7 @@ impl Direct {
             lights.iter().zip(powers).filter(|(l, p)| l.is_infinite() == infinite && **p > 0.0).count()
         };
         let (near, far) = (count(false), count(true));
-        if near == 0 || (far == 0 && near <= HANDFUL) {
+        if near == 0 || (far == 0 && near <= LIGHT_TREE_MIN) {
             return None;
         }
         let far_powers: Vec<f32> =
@@ -106,44 +106,44 @@ impl LightSet {
         self.by_power.total()
     }
 
-    /// Lights at infinity: what escaped rays may see.
+    /// Lights at infinity, which escaped rays may see.
     pub fn infinite(&self) -> &[LightId] {
         &self.infinite
     }
 
-    /// Chooses a light in proportion to power, the choice of light sub-paths; `None` if no light has any.
-    pub fn pick(&self, u: f32) -> Option<(LightId, Pmf)> {
+    /// Samples a light in proportion to power, for a light sub-path; `None` if no light has power.
+    pub fn sample_light(&self, u: f32) -> Option<(LightId, Pmf)> {
         self.by_power.sample(u).map(|(i, p)| (LightId(i as u32), p))
     }
 
-    /// Probability of [`LightSet::pick`].
-    pub fn pmf(&self, id: LightId) -> Pmf {
+    /// Probability of [`LightSet::sample_light`].
+    pub fn pmf_light(&self, id: LightId) -> Pmf {
         self.by_power.pmf(id.index())
     }
 
-    /// Whether [`LightSet::pick_from`] looks at the point at all.
+    /// True if [`LightSet::sample_light_from`] depends on the point.
     #[inline]
-    pub fn choice_depends_on_place(&self) -> bool {
+    pub fn uses_light_tree(&self) -> bool {
         self.direct.is_some()
     }
 
-    /// Chooses a light for the point `p`: the choice for direct light. `n` is the unit geometric normal on the side where light is
-    /// received; sets of lights wholly below its horizon get no probability. `None` if light counts from both sides, or in a volume.
+    /// Samples a light that may light the point `p`, for direct light. `n` is the unit geometric normal on the side where light is
+    /// received; sets of lights wholly below its horizon have no probability. `None` if light is received from both sides, or in a volume.
     ///
-    /// The probability is exactly [`LightSet::pmf_from`] with the same `p` and `n`. `None` is returned only if no light has power.
+    /// The probability is exactly [`LightSet::pmf_light_from`] with the same `p` and `n`. `None` is returned only if no light has power.
     #[inline]
-    pub fn pick_from(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(LightId, Pmf)> {
+    pub fn sample_light_from(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(LightId, Pmf)> {
         match &self.direct {
-            None => self.pick(u),
+            None => self.sample_light(u),
             Some(direct) => direct.sample(p, n, u),
         }
     }
 
-    /// Probability of [`LightSet::pick_from`] with the same `p` and `n`. They sum to one over all lights.
+    /// Probability of [`LightSet::sample_light_from`] with the same `p` and `n`. They sum to one over all lights.
     #[inline]
-    pub fn pmf_from(&self, p: Vec3, n: Option<Vec3>, id: LightId) -> Pmf {
+    pub fn pmf_light_from(&self, p: Vec3, n: Option<Vec3>, id: LightId) -> Pmf {
         match &self.direct {
-            None => self.pmf(id),
+            None => self.pmf_light(id),
             Some(d) if self.lights.get(id.index()).is_some_and(Light::is_infinite) => {
                 d.infinite.pmf(id.index()) * Pmf(d.infinite_share)
             }

@@ -31,7 +31,7 @@ pub use envmap::EnvMap;
 pub use filter::PixelFilter;
 pub use light::Light;
 pub use lights::{LightId, LightSet};
-pub use sample::{DirectSample, EmissionSample, LightEnd};
+pub use sample::{DirectSample, EmissionSample, EmitterVertex};
 pub use sunsky::{SunSky, SunSkyParams};
 pub use triangle::{RadianceTexture, TexturedEmission, TriangleEmission, TriangleLight};
 

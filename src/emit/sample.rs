@@ -1,17 +1,17 @@
-//! What sampling a light returns, and the conventions for lights at infinity.
+//! Samples of lights, and the conventions for lights at infinity.
 //!
 //! A light at infinity has no points. By convention its path vertex y_0 carries a direction; the vertex's "area density" is the
 //! density per steradian of that direction, its geometry term with the next vertex has neither 1/d² nor a cosine at the light,
-//! and the next vertex's area density comes from the disk that emission rays start on. The functions of [`LightEnd`] apply
+//! and the next vertex's area density comes from the disk that emission rays start on. The functions of [`EmitterVertex`] apply
 //! these rules, so that callers write one formula for all lights.
 
-use crate::math::measure::spread;
+use crate::math::measure::area_jacobian;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 use crate::ray::offset::SegmentEnd;
 
-/// Where the light end of a segment is.
+/// The vertex y_0 of a path: the end of a segment at a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LightEnd {
+pub enum EmitterVertex {
     /// A point of an emitting surface.
     Surface {
         /// Position.
@@ -30,64 +30,66 @@ pub enum LightEnd {
     Infinite,
 }
 
-impl LightEnd {
+impl EmitterVertex {
     /// Area density of the light vertex itself: `position` for a light in the scene, `direction` for one at infinity.
-    pub fn vertex_density(&self, position: AreaPdf, direction: SolidAnglePdf) -> AreaPdf {
+    pub fn pdf_vertex(&self, position: AreaPdf, direction: SolidAnglePdf) -> AreaPdf {
         match self {
-            LightEnd::Infinite => AreaPdf(direction.0),
+            EmitterVertex::Infinite => AreaPdf(direction.0),
             _ => position,
         }
     }
 
-    /// What leads on from the light vertex: the density per steradian of the emission's direction; of a light at infinity, the density per
-    /// unit area of its disk.
-    pub fn departure(&self, position: AreaPdf, direction: SolidAnglePdf) -> SolidAnglePdf {
+    /// Density of the emission's direction given the light vertex, per steradian; of a light at infinity, the density of the ray's origin
+    /// on the disk, per unit area.
+    pub fn pdf_emission_dir(&self, position: AreaPdf, direction: SolidAnglePdf) -> SolidAnglePdf {
         match self {
-            LightEnd::Infinite => SolidAnglePdf(position.0),
+            EmitterVertex::Infinite => SolidAnglePdf(position.0),
             _ => direction,
         }
     }
 
     /// Area density of the vertex that follows the light vertex on an emission ray; `cos_next` is the cosine at that vertex
     /// between its normal and the segment, `dist2` the segment's squared length (unused at infinity).
-    pub fn next_density(&self, position: AreaPdf, direction: SolidAnglePdf, cos_next: f32, dist2: f32) -> AreaPdf {
+    pub fn pdf_next_vertex(&self, position: AreaPdf, direction: SolidAnglePdf, cos_next: f32, dist2: f32) -> AreaPdf {
         match self {
-            // The disk is perpendicular to the ray: only the receiver's tilt spreads its density.
-            LightEnd::Infinite => AreaPdf(position.0 * cos_next.abs()),
+            // The disk is perpendicular to the ray: only the cosine at the receiver remains.
+            EmitterVertex::Infinite => AreaPdf(position.0 * cos_next.abs()),
             _ => direction.to_area(cos_next, dist2),
         }
     }
 
-    /// What turns a density per steradian at the next vertex into one of the light vertex, in the measure of
-    /// [`LightEnd::vertex_density`]; `wo` is the unit direction of the segment, either way. A light without extent has one point.
+    /// Factor from a density per steradian at the next vertex to a density of the light vertex, in the measure of
+    /// [`EmitterVertex::pdf_vertex`]. `wo` is the unit direction of the segment, either way, and `dist2` its squared length. The factor of
+    /// a light without extent is 1.
     #[inline]
-    pub fn spread(&self, wo: Vec3, dist2: f32) -> f32 {
+    pub fn area_jacobian(&self, wo: Vec3, dist2: f32) -> f32 {
         match self {
-            LightEnd::Surface { ng, .. } => spread(ng.dot(wo), dist2),
-            LightEnd::Point { .. } | LightEnd::Infinite => 1.0,
+            EmitterVertex::Surface { ng, .. } => area_jacobian(ng.dot(wo), dist2),
+            EmitterVertex::Point { .. } | EmitterVertex::Infinite => 1.0,
         }
     }
 
-    /// The light's end of a segment; `None` at infinity.
+    /// The end of a shadow ray at this vertex; `None` at infinity.
     #[inline]
     pub fn segment_end(&self) -> Option<SegmentEnd> {
         match *self {
-            LightEnd::Surface { p, error, ng } => Some(SegmentEnd::Surface { p, error, ng }),
-            LightEnd::Point { p } => Some(SegmentEnd::Free(p)),
-            LightEnd::Infinite => None,
+            EmitterVertex::Surface { p, error, ng } => Some(SegmentEnd::Surface { p, error, ng }),
+            EmitterVertex::Point { p } => Some(SegmentEnd::Free(p)),
+            EmitterVertex::Infinite => None,
         }
     }
 
-    /// What a light sub-path carries that begins here in the unit direction `leaving` with the density `drawn` of both together, towards a
-    /// vertex at `distance`, where it arrives as `radiance` (of a point: intensity / distance²).
+    /// Throughput of a light sub-path after its first edge. The sub-path leaves this vertex in the unit direction `direction`; `pdf` is the
+    /// joint density of vertex and direction. `radiance` arrives along the edge, whose length is `distance` (of a point light: intensity /
+    /// distance²).
     #[inline]
-    pub fn flux(&self, radiance: Rgb, leaving: Vec3, distance: f32, drawn: f32) -> Rgb {
-        let at_light = match self {
-            LightEnd::Surface { ng, .. } => ng.dot(leaving).abs(),
-            LightEnd::Point { .. } => distance * distance,
-            LightEnd::Infinite => 1.0,
+    pub fn flux(&self, radiance: Rgb, direction: Vec3, distance: f32, pdf: f32) -> Rgb {
+        let factor = match self {
+            EmitterVertex::Surface { ng, .. } => ng.dot(direction).abs(),
+            EmitterVertex::Point { .. } => distance * distance,
+            EmitterVertex::Infinite => 1.0,
         };
-        radiance * (at_light / drawn)
+        radiance * (factor / pdf)
     }
 }
 
@@ -99,7 +101,7 @@ pub struct DirectSample {
     /// Length of the segment; infinite for a light at infinity.
     pub distance: f32,
     /// The segment's end at the light.
-    pub end: LightEnd,
+    pub end: EmitterVertex,
     /// Emitted radiance towards the reference point. Of a point or spot light: intensity / distance². Of a directional light:
     /// irradiance on a surface that faces it. In all cases `radiance / pdf` times BSDF and cosine estimates reflected radiance.
     pub radiance: Rgb,
@@ -132,7 +134,7 @@ pub struct EmissionSample {
     /// The light has one direction.
     pub delta_direction: bool,
     /// The light end of a segment along this ray.
-    pub end: LightEnd,
+    pub end: EmitterVertex,
 }
 
 impl EmissionSample {
@@ -142,8 +144,8 @@ impl EmissionSample {
         self.end.flux(self.radiance, self.direction, 1.0, self.pdf_position.0 * self.pdf_direction.0)
     }
 
-    /// Area density of the light vertex (see [`LightEnd::vertex_density`]).
-    pub fn vertex_density(&self) -> AreaPdf {
-        self.end.vertex_density(self.pdf_position, self.pdf_direction)
+    /// Area density of the light vertex (see [`EmitterVertex::pdf_vertex`]).
+    pub fn pdf_vertex(&self) -> AreaPdf {
+        self.end.pdf_vertex(self.pdf_position, self.pdf_direction)
     }
 }

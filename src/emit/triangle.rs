@@ -3,7 +3,7 @@
 //! As seen from a reference point it is sampled uniformly in solid angle when it is large (see `SPHERICAL_FROM`), and uniformly in
 //! area when it is small and the two hardly differ. Which of them is a function of the point and the triangle alone.
 
-use super::sample::{DirectSample, EmissionSample, LightEnd};
+use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::spherical_triangle::SphericalTriangle;
 use crate::math::float::gamma;
 use crate::math::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere, square_to_triangle};
@@ -179,7 +179,7 @@ impl TriangleLight {
         Some(DirectSample {
             wi,
             distance,
-            end: LightEnd::Surface { p, error, ng: self.ng },
+            end: EmitterVertex::Surface { p, error, ng: self.ng },
             radiance,
             pdf,
             delta: false,
@@ -228,7 +228,7 @@ impl TriangleLight {
             pdf_direction,
             delta_position: false,
             delta_direction: false,
-            end: LightEnd::Surface { p: origin, error, ng: self.ng },
+            end: EmitterVertex::Surface { p: origin, error, ng: self.ng },
         })
     }
 

@@ -1,7 +1,7 @@
 //! Densities that carry their measure in the type, so that adding a solid-angle density to an area density does not compile.
 //!
-//! The only conversions are [`SolidAnglePdf::to_area`] and [`AreaPdf::to_solid_angle`], and [`spread`] where a factor is kept for many of
-//! them (Veach 1997, eq. 8.8: p_A(x') = p_σ(ω) |cos θ'| / d²).
+//! The only conversions are [`SolidAnglePdf::to_area`] and [`AreaPdf::to_solid_angle`], and [`area_jacobian`] where one factor serves several
+//! densities (Veach 1997, eq. 8.8: p_A(x') = p_σ(ω) |cos θ'| / d²).
 
 /// Density per steradian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
@@ -18,9 +18,10 @@ pub struct AreaPdf(pub f32);
 #[repr(transparent)]
 pub struct Pmf(pub f32);
 
-/// |cos| / distance²: what turns a density per steradian into one per unit area at the far point.
+/// dσ/dA = |cos θ'| / d²: the factor from a density per steradian to one per unit area at the far point, whose normal makes `cos` with
+/// the direction; `dist2` is the squared distance in scene units.
 #[inline]
-pub fn spread(cos: f32, dist2: f32) -> f32 {
+pub fn area_jacobian(cos: f32, dist2: f32) -> f32 {
     cos.abs() / dist2
 }
 

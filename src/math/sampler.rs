@@ -1,7 +1,7 @@
 //! Sample values of one path: Owen-scrambled Sobol points on the camera and the first vertices, hashed numbers beyond.
 //!
 //! Each pixel has its own scramble, so pixels are independent and one pixel's samples are stratified over iterations
-//! (Burley 2020, "Practical hash-based Owen scrambling"). Values come four at a time, one set for each purpose of a vertex.
+//! (Burley 2020, "Practical hash-based Owen scrambling"). Values come four at a time, one set for each [`SampleSlot`] of a vertex.
 //!
 //! The Sobol matrices and the scramble are those of the crate `sobol_burley`; three things make them cheaper here. The shuffled index
 //! is the same for all dimensions of a path and is computed once. A Sobol point is linear in the bits of its index, so instead
@@ -12,12 +12,12 @@ use super::hash::{HashRng, hash_words, mix64};
 use sobol_burley::parts::{hash, owen_scramble_rev, sobol_rev, u32_to_f32_norm};
 use std::sync::LazyLock;
 
-/// What four numbers of a vertex are for. Fixed slots keep Sobol dimensions aligned whatever earlier vertices consumed.
+/// Sets of four numbers of a vertex. Fixed slots keep Sobol dimensions aligned whatever earlier vertices consumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
-    /// Choosing a light and a point on it, and where draws of resampled connections begin: [light, u, v, draws].
+pub enum SampleSlot {
+    /// Sampling a light and a point on it, and one more number for connections to stored vertices: [light, u, v, connection].
     Emitter = 0,
-    /// Choosing a lobe and a direction, and Russian roulette: [lobe, u, v, roulette].
+    /// Sampling a lobe and a direction, and Russian roulette: [lobe, u, v, roulette].
     Scatter = 1,
 }
 
@@ -148,8 +148,8 @@ impl PathSampler {
 
     /// Numbers for vertex `vertex` (1 is the first hit).
     #[inline]
-    pub fn vertex(&mut self, vertex: u32, purpose: Purpose) -> [f32; 4] {
-        self.set(vertex, purpose as usize)
+    pub fn vertex(&mut self, vertex: u32, slot: SampleSlot) -> [f32; 4] {
+        self.set(vertex, slot as usize)
     }
 
     /// Unstratified numbers for whatever has no slot.
@@ -174,8 +174,8 @@ mod tests {
             assert_eq!(sampler.origin(), expected(0));
             assert_eq!(sampler.origin_direction(), expected(1));
             for vertex in 1..=SOBOL_VERTICES {
-                assert_eq!(sampler.vertex(vertex, Purpose::Emitter), expected(2 * vertex));
-                assert_eq!(sampler.vertex(vertex, Purpose::Scatter), expected(2 * vertex + 1));
+                assert_eq!(sampler.vertex(vertex, SampleSlot::Emitter), expected(2 * vertex));
+                assert_eq!(sampler.vertex(vertex, SampleSlot::Scatter), expected(2 * vertex + 1));
             }
         }
     }
@@ -200,9 +200,9 @@ mod tests {
         for path in 0..N as u64 {
             let mut sampler = PathSampler::new(3, 0, path / 250, path % 250);
             let at = |u: [f32; 4]| u.map(|u| (u * 8.0) as usize);
-            let (a, b) = (sampler.vertex(6, Purpose::Emitter), sampler.vertex(6, Purpose::Scatter));
+            let (a, b) = (sampler.vertex(6, SampleSlot::Emitter), sampler.vertex(6, SampleSlot::Scatter));
             seen.insert(a.map(f32::to_bits));
-            let c = sampler.vertex(7, Purpose::Emitter);
+            let c = sampler.vertex(7, SampleSlot::Emitter);
             for (k, (x, y)) in [(at(a), at(b)), (at(a), at(c))].into_iter().enumerate() {
                 for i in 0..4 {
                     cells[k][i][8 * x[i] + y[i]] += 1;

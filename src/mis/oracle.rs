@@ -3,8 +3,8 @@
 
 use super::factor::{ConnectionFactor, IncidentSubpath, ResamplingTarget};
 use super::{Heuristic, MisContext};
-use crate::emit::LightEnd;
-use crate::math::measure::spread;
+use crate::emit::EmitterVertex;
+use crate::math::measure::area_jacobian;
 use crate::math::{Rgb, Vec3};
 use crate::path::{DirectionSampler, FullPath, Interior};
 use crate::prepared::PreparedScene;
@@ -57,11 +57,11 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         let (d, distance) = self.path.edge(e);
         match i {
             0 => match self.path.origin.end {
-                LightEnd::Surface { ng, .. } => f64::from(spread(ng.dot(d), distance * distance)),
-                LightEnd::Point { .. } => f64::from(distance).powi(-2),
-                LightEnd::Infinite => 1.0,
+                EmitterVertex::Surface { ng, .. } => f64::from(area_jacobian(ng.dot(d), distance * distance)),
+                EmitterVertex::Point { .. } => f64::from(distance).powi(-2),
+                EmitterVertex::Infinite => 1.0,
             },
-            _ => f64::from(spread(self.path.interior[i - 1].point.ng.dot(d), distance * distance)),
+            _ => f64::from(area_jacobian(self.path.interior[i - 1].point.ng.dot(d), distance * distance)),
         }
     }
 
@@ -84,8 +84,8 @@ impl<F: ConnectionFactor> PathView<'_, F> {
     fn light_pdfs(&self) -> Vec<f64> {
         let path = self.path;
         let light = self.scene.lights.get(path.origin.light);
-        let chosen = f64::from(self.scene.lights.pmf(path.origin.light).0);
-        let (position, direction) = light.pdf_emission_given_vertex(path.origin.direction);
+        let chosen = f64::from(self.scene.lights.pmf_light(path.origin.light).0);
+        let (position, direction) = light.pdf_emission_at_vertex(path.origin.direction);
         let (position, direction) = (f64::from(position.0), f64::from(direction.0));
         let infinite = light.is_infinite();
         let mut pdfs = vec![chosen * if infinite { direction } else { position }];
@@ -121,9 +121,9 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         let path = self.path;
         let light = self.scene.lights.get(path.origin.light);
         path.interior.first().map_or(1.0, |v| {
-            let chosen = self.scene.lights.pmf_from(v.point.p, v.light_choice_normal, path.origin.light);
+            let chosen = self.scene.lights.pmf_light_from(v.point.p, v.light_choice_normal, path.origin.light);
             if light.is_delta() {
-                return f64::from(chosen.0) / f64::from(self.scene.lights.pmf(path.origin.light).0);
+                return f64::from(chosen.0) / f64::from(self.scene.lights.pmf_light(path.origin.light).0);
             }
             let (d, distance) = path.edge(0);
             let direct = f64::from(light.pdf_direct(v.point.p, -d, distance).0);

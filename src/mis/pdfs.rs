@@ -8,7 +8,7 @@
 //! the direction's density at the next vertex (see `emit::sample`). [`VertexPdfs::area_jacobian`] hides the difference.
 
 use super::factor::ConnectionFactor;
-use crate::math::measure::spread;
+use crate::math::measure::area_jacobian;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::{DirectionSampler, Edge, Vertex};
 use crate::shade::{BsdfSample, Transport};
@@ -78,7 +78,7 @@ impl SubpathPdfs {
         let (edge, cos) = (vertex.edge, vertex.place.cosine(vertex.wo));
         let distance2 = edge.distance * edge.distance;
         let pdf_fwd = edge.pdf_with_survival().to_area(cos, distance2);
-        self.vertices.push(VertexPdfs::new(pdf_fwd, spread(self.cos_leaving, distance2), survival));
+        self.vertices.push(VertexPdfs::new(pdf_fwd, area_jacobian(self.cos_leaving, distance2), survival));
         pdf_fwd
     }
 

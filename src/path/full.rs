@@ -3,7 +3,7 @@
 //! Renders never need it. Slow definitions are written for it, in tests and where a single sample is explained.
 
 use super::vertex::{Scatter, StoredPlace};
-use crate::emit::{LightEnd, LightId};
+use crate::emit::{EmitterVertex, LightId};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::shade::{Bsdf, SurfacePoint};
 
@@ -39,7 +39,7 @@ pub struct Origin {
     /// The light that v_0 is on.
     pub light: LightId,
     /// v_0.
-    pub end: LightEnd,
+    pub end: EmitterVertex,
     /// Unit direction that leaves v_0.
     pub direction: Vec3,
     /// β_L at v_1 of a light sub-path that begins like this: emission and its cosine over the densities of v_0 and of the direction.
@@ -67,8 +67,8 @@ impl FullPath {
     pub fn position(&self, i: usize) -> Option<Vec3> {
         if i == 0 {
             match self.origin.end {
-                LightEnd::Surface { p, .. } | LightEnd::Point { p } => Some(p),
-                LightEnd::Infinite => None,
+                EmitterVertex::Surface { p, .. } | EmitterVertex::Point { p } => Some(p),
+                EmitterVertex::Infinite => None,
             }
         } else {
             Some(self.interior.get(i - 1).map_or(self.lens, |v| v.point.p))

@@ -1,6 +1,6 @@
 //! A vertex of a sub-path: a place, and a function that scatters light there.
 
-use crate::math::measure::spread;
+use crate::math::measure::area_jacobian;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::ray::Hit;
 use crate::ray::offset::SegmentEnd;
@@ -82,7 +82,7 @@ impl StoredPlace {
     /// medium: volume) of this place: |cos| / d² on a surface, 1 / d² in a medium (Veach 1997, eq. 8.8).
     #[inline]
     pub fn area_jacobian(&self, d: Vec3, distance2: f32) -> f32 {
-        spread(self.cosine(d), distance2)
+        area_jacobian(self.cosine(d), distance2)
     }
 
     /// The geometric normal on the side of the direction `d`.

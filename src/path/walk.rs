@@ -7,7 +7,7 @@ use super::directions::DirectionSampler;
 use super::iteration::Iteration;
 use super::roulette::PathLimits;
 use super::vertex::{Edge, Place, Scatter, Vertex};
-use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::sampler::{PathSampler, SampleSlot};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
 use crate::prepared::PreparedScene;
 use crate::ray::{Ray, RayKind, T_MIN, Tracer, offset::offset_point};
@@ -118,7 +118,7 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
             return;
         }
 
-        let u = sampler.vertex(index, Purpose::Scatter);
+        let u = sampler.vertex(index, SampleSlot::Scatter);
         let Some(sample) = directions.sample(point.p, &vertex.scatter, wo, [u[0], u[1], u[2]], mode) else { return };
         let survival = limits.survival(index, &vertex.scatter);
         if u[3] >= survival {

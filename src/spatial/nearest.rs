@@ -12,12 +12,12 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Most neighbours that are found.
-pub const MOST: usize = 3;
+pub const MAX_NEIGHBORS: usize = 3;
 /// Cells along the longest side of the box around the points.
 const CELLS: usize = 96;
 /// Bits of a point's number; all of them set: no point.
 const BITS: u32 = 21;
-const NOBODY: u64 = (1 << BITS) - 1;
+const NO_POINT: u64 = (1 << BITS) - 1;
 /// Slots hold this bit when they have been searched.
 const KNOWN: u64 = 1 << 63;
 
@@ -102,16 +102,16 @@ fn build_tree(points: &[Vec3], numbers: &mut [u32], axis: usize) {
 
 /// The nearest so far, sorted by distance.
 struct Best {
-    distance2: [f32; MOST],
-    number: [u64; MOST],
+    distance2: [f32; MAX_NEIGHBORS],
+    number: [u64; MAX_NEIGHBORS],
 }
 
 impl Best {
     fn offer(&mut self, distance2: f32, number: u32) {
         // Equal distances are ordered by number, so that the answer does not depend on the tree.
         let before = |i: usize, best: &Best| (distance2, u64::from(number)) < (best.distance2[i], best.number[i]);
-        let Some(at) = (0..MOST).find(|&i| before(i, self)) else { return };
-        for i in (at + 1..MOST).rev() {
+        let Some(at) = (0..MAX_NEIGHBORS).find(|&i| before(i, self)) else { return };
+        for i in (at + 1..MAX_NEIGHBORS).rev() {
             self.distance2[i] = self.distance2[i - 1];
             self.number[i] = self.number[i - 1];
         }
@@ -128,7 +128,7 @@ fn search(points: &[Vec3], tree: &[u32], axis: usize, p: Vec3, best: &mut Best) 
     let offset = p[axis] - q[axis];
     let (near, far) = if offset < 0.0 { (left, right) } else { (right, left) };
     search(points, near, (axis + 1) % 3, p, best);
-    if offset * offset <= best.distance2[MOST - 1] {
+    if offset * offset <= best.distance2[MAX_NEIGHBORS - 1] {
         search(points, far, (axis + 1) % 3, p, best);
     }
 }
@@ -137,7 +137,7 @@ impl NearestPoints {
     /// An index of `points` with the unit normals of their surfaces' sides. At most 2²¹ − 1 points are indexed; later ones are
     /// never found.
     pub fn new(points: Vec<Vec3>, normals: Vec<Vec3>, metric: Metric) -> NearestPoints {
-        let most = points.len().min(normals.len()).min(NOBODY as usize);
+        let most = points.len().min(normals.len()).min(NO_POINT as usize);
         let trees = std::array::from_fn(|f| {
             let mut tree: Vec<u32> = (0..most as u32).filter(|&i| metric.finds(normals[i as usize], f)).collect();
             build_tree(&points, &mut tree, 0);
@@ -179,7 +179,7 @@ impl NearestPoints {
     }
 
     /// Numbers of the points nearest to `p` (up to the size of a cell) among those whose surface faces about as `n` does, nearest
-    /// first; fewer than [`MOST`] where there are not so many.
+    /// first; fewer than [`MAX_NEIGHBORS`] where there are not so many.
     #[inline]
     pub fn find(&self, p: Vec3, n: Vec3) -> impl Iterator<Item = usize> + use<> {
         let cell = ((p - self.lo) * self.per_cell).to_array();
@@ -193,16 +193,19 @@ impl NearestPoints {
             // Whoever else searched found the same.
             slot.store(found, Ordering::Relaxed);
         }
-        (0..MOST as u32).map(move |i| found >> (i * BITS) & NOBODY).filter(|&n| n != NOBODY).map(|n| n as usize)
+        (0..MAX_NEIGHBORS as u32)
+            .map(move |i| found >> (i * BITS) & NO_POINT)
+            .filter(|&n| n != NO_POINT)
+            .map(|n| n as usize)
     }
 
     #[cold]
     fn search(&self, cell: [usize; 3], facing: usize) -> u64 {
         let middle = self.lo + Vec3::from(cell.map(|c| c as f32 + 0.5)) / self.per_cell;
-        let mut best = Best { distance2: [f32::INFINITY; MOST], number: [NOBODY; MOST] };
+        let mut best = Best { distance2: [f32::INFINITY; MAX_NEIGHBORS], number: [NO_POINT; MAX_NEIGHBORS] };
         search(&self.points, &self.trees[facing], 0, middle, &mut best);
         if let Some(group) = self.groups.as_ref().and_then(|groups| groups.get(best.number[0] as usize)) {
-            best = Best { distance2: [f32::INFINITY; MOST], number: [NOBODY; MOST] };
+            best = Best { distance2: [f32::INFINITY; MAX_NEIGHBORS], number: [NO_POINT; MAX_NEIGHBORS] };
             for i in group.clone().filter(|&i| self.metric.finds(self.normals[i], facing)) {
                 best.offer(middle.distance_squared(self.points[i]), i as u32);
             }
@@ -247,11 +250,12 @@ mod tests {
                 let d = |i: usize| middle.distance_squared(points[i]);
                 d(a).total_cmp(&d(b)).then(a.cmp(&b))
             });
-            assert_eq!(plain.find(p, direction(f)).collect::<Vec<_>>(), by_distance[..MOST]);
+            assert_eq!(plain.find(p, direction(f)).collect::<Vec<_>>(), by_distance[..MAX_NEIGHBORS]);
             let all: Vec<usize> = by_distance.into_iter().filter(|&i| normals[i].dot(direction(f)) > 0.2).collect();
-            let of_group: Vec<usize> = all.iter().copied().filter(|i| i / 10 == all[0] / 10).take(MOST).collect();
+            let of_group: Vec<usize> =
+                all.iter().copied().filter(|i| i / 10 == all[0] / 10).take(MAX_NEIGHBORS).collect();
             for _ in 0..2 {
-                assert_eq!(index.find(p, direction(f)).collect::<Vec<_>>(), all[..MOST]);
+                assert_eq!(index.find(p, direction(f)).collect::<Vec<_>>(), all[..MAX_NEIGHBORS]);
                 assert_eq!(grouped.find(p, direction(f)).collect::<Vec<_>>(), of_group);
             }
         }

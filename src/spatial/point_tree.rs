@@ -37,7 +37,7 @@ pub struct PointTree {
 
 /// Where a cut is looked at from: a ball of places whose surfaces face about the same way.
 #[derive(Clone, Copy, Debug)]
-pub struct Viewpoint {
+pub struct ReceiverBounds {
     /// Middle of the ball.
     pub centre: Vec3,
     /// Its radius.
@@ -74,7 +74,7 @@ impl Ord for Open {
 
 /// Memory of cuts, to be used again.
 #[derive(Default)]
-pub struct CutMemory(BinaryHeap<Open>);
+pub struct CutScratch(BinaryHeap<Open>);
 
 impl PointTree {
     /// Builds the tree anew over points in Morton order ([`morton::sorted`](super::morton::sorted)), each with its position and its weight,
@@ -158,7 +158,7 @@ impl PointTree {
     /// How much the light of a node may differ over its points as seen from `from`: its weight times the range of 1/distance². The ball's own
     /// extent softens the range: what differs inside of the ball no cut can tell.
     #[inline]
-    fn error(&self, node: &Node, from: &Viewpoint) -> f32 {
+    fn error(&self, node: &Node, from: &ReceiverBounds) -> f32 {
         let weight = (self.sums[node.end as usize] - self.sums[node.first as usize]) as f32;
         let to = node.centre - from.centre;
         if from.normal.dot(to) < -(node.radius + from.radius) {
@@ -172,7 +172,7 @@ impl PointTree {
     }
 
     /// At most `clusters` ranges of points, a partition of all of them, left in `out` in the order of the points.
-    pub fn cut(&self, from: &Viewpoint, clusters: usize, memory: &mut CutMemory, out: &mut Vec<Range<usize>>) {
+    pub fn cut(&self, from: &ReceiverBounds, clusters: usize, memory: &mut CutScratch, out: &mut Vec<Range<usize>>) {
         out.clear();
         let Some(root) = self.nodes.first() else { return };
         let heap = &mut memory.0;
@@ -241,9 +241,9 @@ mod tests {
         for n in [0, 1, 2, 3, 50, 3000] {
             let (tree, points, weights) = tree(n, n as u64);
             let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
-            let (mut memory, mut cut) = (CutMemory::default(), vec![]);
+            let (mut memory, mut cut) = (CutScratch::default(), vec![]);
             for clusters in [1, 2, 16, 200, 5000] {
-                let from = Viewpoint { centre: Vec3::new(3.0, -1.0, 2.0), radius: 0.3, normal: Vec3::Y };
+                let from = ReceiverBounds { centre: Vec3::new(3.0, -1.0, 2.0), radius: 0.3, normal: Vec3::Y };
                 tree.cut(&from, clusters, &mut memory, &mut cut);
                 assert!(cut.len() <= clusters, "{n} {clusters}: {}", cut.len());
                 assert!(cut.len() >= clusters.min(points.len() / LEAF / 2), "{n} {clusters}: {}", cut.len());
@@ -285,8 +285,8 @@ mod tests {
     #[test]
     fn cuts_are_fine_where_they_are_near() {
         let (tree, points, _) = tree(3000, 4);
-        let from = Viewpoint { centre: Vec3::new(0.0, 5.0, 5.0), radius: 0.2, normal: Vec3::ZERO };
-        let (mut memory, mut cut) = (CutMemory::default(), vec![]);
+        let from = ReceiverBounds { centre: Vec3::new(0.0, 5.0, 5.0), radius: 0.2, normal: Vec3::ZERO };
+        let (mut memory, mut cut) = (CutScratch::default(), vec![]);
         tree.cut(&from, 100, &mut memory, &mut cut);
         let size = |near: bool| {
             let own: Vec<usize> = cut

@@ -70,14 +70,15 @@ fn probabilities_sum_to_one_and_match_the_choices() {
         for (j, (p, n)) in places().into_iter().enumerate() {
             let draws = 20_000;
             for from_point in [true, false] {
-                let pmf = |id| if from_point { set.pmf_from(p, n, id) } else { set.pmf(id) };
+                let pmf = |id| if from_point { set.pmf_light_from(p, n, id) } else { set.pmf_light(id) };
                 let total: f64 = set.iter().map(|(id, _)| f64::from(pmf(id).0)).sum();
                 assert!((total - 1.0).abs() < 1e-5, "{total}");
                 let mut observed = vec![0.0; set.len()];
                 let mut rng = rng(90 + (k * 10 + j) as u64);
                 for _ in 0..draws {
                     let u = rng.next_f32();
-                    let (id, probability) = if from_point { set.pick_from(p, n, u) } else { set.pick(u) }.unwrap();
+                    let (id, probability) =
+                        if from_point { set.sample_light_from(p, n, u) } else { set.sample_light(u) }.unwrap();
                     assert!((probability.0 - pmf(id).0).abs() <= 1e-6 * probability.0, "{probability:?} {:?}", pmf(id));
                     assert!(set.get(id).power() > 0.0);
                     observed[id.index()] += 1.0;
@@ -104,7 +105,7 @@ fn lights_without_probability_are_dark() {
             _ => near,
         };
         let n = (i % 3 > 0).then(|| random_direction(&mut rng));
-        for (id, light) in set.iter().filter(|(id, _)| set.pmf_from(p, n, *id).0 == 0.0) {
+        for (id, light) in set.iter().filter(|(id, _)| set.pmf_light_from(p, n, *id).0 == 0.0) {
             dark += 1;
             for _ in 0..4 {
                 if let Some(s) = light.sample_direct(p, pair(&mut rng)) {
@@ -134,8 +135,8 @@ fn the_tree_follows_the_distance() {
     let sum: f64 = set.iter().map(|(id, _)| value(id)).sum();
     let second = |pmf: &dyn Fn(LightId) -> f64| -> f64 { set.iter().map(|(id, _)| value(id).powi(2) / pmf(id)).sum() };
     let variance = |pmf: &dyn Fn(LightId) -> f64| second(pmf) / (sum * sum) - 1.0;
-    let by_power = variance(&|id| f64::from(set.pmf(id).0));
-    let by_tree = variance(&|id| f64::from(set.pmf_from(p, Some(n), id).0));
+    let by_power = variance(&|id| f64::from(set.pmf_light(id).0));
+    let by_tree = variance(&|id| f64::from(set.pmf_light_from(p, Some(n), id).0));
     assert!(by_tree < 0.1 * by_power, "{by_tree} {by_power}");
 }
 
@@ -144,23 +145,23 @@ fn none_one_and_many_coincident_lights() {
     let dark = || Light::Point(PointLight::new(DVec3::ZERO, Rgb::BLACK, DVec3::ZERO));
     for lights in [vec![], vec![dark()], vec![dark(), dark()]] {
         let set = LightSet::new(lights);
-        assert!(set.pick(0.5).is_none() && set.pick_from(Vec3::X, None, 0.5).is_none());
-        assert!(set.iter().all(|(id, _)| set.pmf(id).0 == 0.0));
+        assert!(set.sample_light(0.5).is_none() && set.sample_light_from(Vec3::X, None, 0.5).is_none());
+        assert!(set.iter().all(|(id, _)| set.pmf_light(id).0 == 0.0));
     }
     for (name, light) in all_lights() {
         let set = LightSet::new(vec![light]);
         let one = Some((LightId(0), crate::math::Pmf(1.0)));
-        assert!(set.pick(0.9) == one && set.pick_from(Vec3::X, Some(Vec3::Z), 0.9) == one, "{name}");
+        assert!(set.sample_light(0.9) == one && set.sample_light_from(Vec3::X, Some(Vec3::Z), 0.9) == one, "{name}");
         assert_eq!(set.infinite().len(), usize::from(set.get(LightId(0)).is_infinite()));
     }
     // All in one place: no split is better than another, and the depth stays bounded.
     let light = |_| Light::Point(PointLight::new(DVec3::ONE, Rgb::WHITE, DVec3::ZERO));
     let set = LightSet::new((0..5000).map(light).collect());
-    let total: f32 = set.iter().map(|(id, _)| set.pmf_from(Vec3::ZERO, None, id).0).sum();
+    let total: f32 = set.iter().map(|(id, _)| set.pmf_light_from(Vec3::ZERO, None, id).0).sum();
     assert!((total - 1.0).abs() < 1e-3, "{total}");
     // Ever farther apart: bucket splits peel off one light at a time.
     let light = |i: i32| Light::Point(PointLight::new(DVec3::X * 1.3f64.powi(i), Rgb::WHITE, DVec3::ZERO));
     let set = LightSet::new((0..200).map(light).collect());
-    let total: f32 = set.iter().map(|(id, _)| set.pmf_from(Vec3::ZERO, None, id).0).sum();
+    let total: f32 = set.iter().map(|(id, _)| set.pmf_light_from(Vec3::ZERO, None, id).0).sum();
     assert!((total - 1.0).abs() < 1e-3, "{total}");
 }

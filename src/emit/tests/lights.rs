@@ -56,7 +56,7 @@ fn direct_densities_agree_with_their_samples() {
                 }
                 assert!(s.pdf.0 > 0.0 && (pdf.0 / s.pdf.0 - 1.0).abs() < 1e-6, "{name} {} {}", s.pdf.0, pdf.0);
                 let b = match (&light, s.end) {
-                    (Light::Triangle(t), LightEnd::Surface { p, error, ng }) => {
+                    (Light::Triangle(t), EmitterVertex::Surface { p, error, ng }) => {
                         assert!((from + s.wi * s.distance - p).abs().max_element() < 1e-5 * (1.0 + s.distance));
                         assert!(ng.dot(s.wi) < 0.0 && error > 0.0 && error < 1e-5);
                         barycentrics(t.corners(), p)
@@ -105,7 +105,7 @@ fn points_on_triangles_are_distributed_as_their_density() {
         let mut rng = rng(10 + k as u64);
         for _ in 0..n {
             let s = light.sample_direct(from, pair(&mut rng)).unwrap();
-            let LightEnd::Surface { p, .. } = s.end else { panic!("a triangle is a surface") };
+            let EmitterVertex::Surface { p, .. } = s.end else { panic!("a triangle is a surface") };
             let u =
                 triangle_to_square(barycentrics(v, p)).map(|u| ((u * CELLS as f32).max(0.0) as usize).min(CELLS - 1));
             observed[u[1] * CELLS + u[0]] += 1.0;
@@ -270,15 +270,15 @@ fn emission_carries_the_power_and_agrees_with_its_densities() {
                 (light.delta_position(), light.delta_direction()),
                 "{name}"
             );
-            let (position, direction) = light.pdf_emission_given_vertex(s.direction);
+            let (position, direction) = light.pdf_emission_at_vertex(s.direction);
             assert!((position.0 / s.pdf_position.0 - 1.0).abs() < 1e-6, "{name}");
             assert!((direction.0 / s.pdf_direction.0 - 1.0).abs() < 1e-3, "{name} {direction:?} {:?}", s.pdf_direction);
-            if let (true, LightEnd::Infinite) = (light.is_infinite(), s.end) {
+            if let (true, EmitterVertex::Infinite) = (light.is_infinite(), s.end) {
                 // The ray enters the scene's bounding sphere of radius 2 and starts before it.
                 assert!(s.origin.dot(s.direction) <= -2.0 && s.origin.cross(s.direction).length() <= 2.001, "{name}");
-                assert_eq!(s.vertex_density().0, s.pdf_direction.0);
+                assert_eq!(s.pdf_vertex().0, s.pdf_direction.0);
             } else {
-                assert_eq!(s.vertex_density().0, s.pdf_position.0);
+                assert_eq!(s.pdf_vertex().0, s.pdf_position.0);
             }
         }
         let expected = f64::from(light.power());
@@ -295,7 +295,7 @@ fn infinite_lights_follow_the_vertex_conventions() {
     let s = light.sample_emission([0.3, 0.6], [0.2, 0.7]).unwrap();
     let cos = 0.25;
     let area = std::f32::consts::PI * (2.0f32 * 1.0001).powi(2);
-    assert!((s.end.next_density(s.pdf_position, s.pdf_direction, cos, 9.0).0 * area - cos).abs() < 1e-6);
+    assert!((s.end.pdf_next_vertex(s.pdf_position, s.pdf_direction, cos, 9.0).0 * area - cos).abs() < 1e-6);
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::bidir::vertex::direction_to;
 use crate::math::{Rgb, Vec3};
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, RayStats};
-use crate::spatial::nearest::{MOST, Metric};
+use crate::spatial::nearest::{MAX_NEIGHBORS, Metric};
 use crate::spatial::{NearestPoints, Skeleton, morton};
 use std::ops::Range;
 
@@ -83,7 +83,7 @@ impl ImportanceRecords {
 
     /// The records of the point `p` on the side of the unit normal `n`, at most `most`; returns their number.
     #[inline]
-    pub fn find(&self, p: Vec3, n: Vec3, most: usize, found: &mut [usize; MOST]) -> usize {
+    pub fn find(&self, p: Vec3, n: Vec3, most: usize, found: &mut [usize; MAX_NEIGHBORS]) -> usize {
         match &self.finder {
             Finder::Nearest(index) => {
                 let mut count = 0;

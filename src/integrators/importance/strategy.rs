@@ -5,14 +5,14 @@ use super::record_pmfs::{RecordPmfs, Selection, SelectionScheme};
 use super::records::ImportanceRecords;
 use super::running_means::RunningMeans;
 use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexStore, WarmUp};
-use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::sampler::{PathSampler, SampleSlot};
 use crate::math::{Rgb, Vec3};
 use crate::mis::ConnectionFactor;
 use crate::mis::factors::RecordNormalization;
 use crate::path::{Iteration, StoredPlace};
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{RayStats, Tracer};
-use crate::spatial::nearest::MOST;
+use crate::spatial::nearest::MAX_NEIGHBORS;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
@@ -57,7 +57,7 @@ pub(super) struct RecordSettings {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NearestRecords {
     count: usize,
-    records: [usize; MOST],
+    records: [usize; MAX_NEIGHBORS],
 }
 
 impl NearestRecords {
@@ -177,7 +177,7 @@ impl<F: RecordFactor> RecordStrategy<F> {
         let share = pmfs.length(class).map_or(1.0, |s| self.structure.share_of_length(s));
         let fraction = eye.fraction * share;
         // Next event leaves the last of its numbers. Classes have offsets of their own, or their draws would be alike.
-        let [.., offset] = sampler.vertex(eye.vertex.index, Purpose::Emitter);
+        let [.., offset] = sampler.vertex(eye.vertex.index, SampleSlot::Emitter);
         let offset = (offset + class as f32 * GOLDEN).fract();
         for number in 0..samples {
             let [record, present, ..] = sampler.rng().next_4();

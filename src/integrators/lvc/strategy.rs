@@ -4,7 +4,7 @@
 //! is estimated by f / (C M p(ȳ) p(z̄) / V).
 
 use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexStore, WarmUp};
-use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::sampler::{PathSampler, SampleSlot};
 use crate::math::{Rgb, Vec3};
 use crate::mis::factors::UniformFactor;
 use crate::path::StoredPlace;
@@ -104,7 +104,7 @@ impl ConnectionStrategy for VertexCache {
             return;
         }
         // Next event leaves the last of its numbers. Systematic draws: vertices that are neighbours in the store are neighbours in space.
-        let [.., offset] = sampler.vertex(eye.vertex.index, Purpose::Emitter);
+        let [.., offset] = sampler.vertex(eye.vertex.index, SampleSlot::Emitter);
         let scale = vertices / (connections as f32 * self.state.paths as f32 * eye.fraction);
         for number in 0..connections {
             if eye.fraction < 1.0 && sampler.rng().next_f32() >= eye.fraction {

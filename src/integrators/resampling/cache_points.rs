@@ -16,8 +16,8 @@ use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, RayStats};
 use crate::shade::{BsdfPool, KeptBsdf, Transport};
 use crate::spatial::NearestPoints;
-use crate::spatial::nearest::MOST;
-use crate::spatial::point_tree::Viewpoint;
+use crate::spatial::nearest::MAX_NEIGHBORS;
+use crate::spatial::point_tree::ReceiverBounds;
 use std::ops::Range;
 
 /// Radii of a group beyond which its points say nothing about visibility.
@@ -98,7 +98,7 @@ fn leave_one_out_neighbors(points: &[EyeSubpathVertex], groups: &[Range<usize>])
         let mut others: Vec<usize> = group.clone().filter(|&i| i != own).collect();
         let distance = |i: &usize| points[own].p.distance_squared(points[*i].p);
         others.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-        others.iter().take(MOST).fold(0, |bits, i| bits | 1 << (i - group.start))
+        others.iter().take(MAX_NEIGHBORS).fold(0, |bits, i| bits | 1 << (i - group.start))
     };
     groups.iter().flat_map(|group| group.clone().map(move |own| nearest(group, own))).collect()
 }
@@ -180,7 +180,7 @@ impl CachePoints {
     }
 
     /// The ball around a group of cache points, with their common normal.
-    pub fn receiver_bounds(&self, group: &Range<usize>) -> Viewpoint {
+    pub fn receiver_bounds(&self, group: &Range<usize>) -> ReceiverBounds {
         let (points, sides) = (&self.index.points()[group.clone()], &self.index.normals()[group.clone()]);
         let count = group.len().max(1) as f32;
         let centre = points.iter().sum::<Vec3>() / count;
@@ -188,7 +188,7 @@ impl CachePoints {
         // Sides that differ much have no horizon in common.
         let mean = sides.iter().sum::<Vec3>() / count;
         let normal = if mean.length_squared() > 0.98 { mean.normalize() } else { Vec3::ZERO };
-        Viewpoint { centre, radius, normal }
+        ReceiverBounds { centre, radius, normal }
     }
 
     /// Means over iterations so far of the light that the cache points around a place found, on the side of the direction `d`.

@@ -18,7 +18,7 @@ use crate::math::hash::HashRng;
 use crate::path::{Iteration, streams};
 use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
-use crate::spatial::point_tree::CutMemory;
+use crate::spatial::point_tree::CutScratch;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -136,7 +136,7 @@ impl GroupPmf {
         store: &VertexStore,
         clusters: usize,
         rng: &mut HashRng,
-        memory: &mut CutMemory,
+        memory: &mut CutScratch,
     ) {
         store.tree.cut(&caches.receiver_bounds(group), clusters, memory, &mut self.ranges);
         self.entries.clear();
@@ -240,7 +240,7 @@ impl Pmfs {
             let number = |(g, range): (usize, &Range<usize>)| std::iter::repeat_n(g as u32, range.len());
             self.group_of = caches.groups.iter().enumerate().flat_map(number).collect();
         }
-        let of_group = |memory: &mut CutMemory, (number, (pmf, group)): (usize, (&mut GroupPmf, &Range<usize>))| {
+        let of_group = |memory: &mut CutScratch, (number, (pmf, group)): (usize, (&mut GroupPmf, &Range<usize>))| {
             let mut tracer = iteration.tracer();
             match second_stage {
                 None => pmf.count = store.len(),
@@ -254,7 +254,7 @@ impl Pmfs {
             tracer.stats
         };
         let groups = self.groups.par_iter_mut().zip(&caches.groups).enumerate();
-        groups.map_init(CutMemory::default, of_group).reduce(RayStats::default, |mut a, b| {
+        groups.map_init(CutScratch::default, of_group).reduce(RayStats::default, |mut a, b| {
             a.merge(&b);
             a
         })

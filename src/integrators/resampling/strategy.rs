@@ -22,14 +22,14 @@ use super::path_count::{EYE_COST, VERTEX_COST, best_path_count};
 use super::pmfs::{Pmfs, Selection};
 use super::settings::ResamplingSettings;
 use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexStore, WarmUp};
-use crate::math::sampler::{PathSampler, Purpose};
+use crate::math::sampler::{PathSampler, SampleSlot};
 use crate::math::{Rgb, Vec3};
 use crate::mis::ConnectionFactor;
 use crate::mis::factors::Stages;
 use crate::path::{Iteration, StoredPlace};
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{RayKind, RayStats, Tracer};
-use crate::spatial::nearest::MOST;
+use crate::spatial::nearest::MAX_NEIGHBORS;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
@@ -42,7 +42,7 @@ const WARM_UP_PATHS: u32 = 4000;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NearestCaches {
     count: usize,
-    caches: [usize; MOST],
+    caches: [usize; MAX_NEIGHBORS],
 }
 
 impl NearestCaches {
@@ -277,7 +277,7 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
             return;
         }
         // Next event leaves the last of its numbers.
-        let [.., offset] = sampler.vertex(eye.vertex.index, Purpose::Emitter);
+        let [.., offset] = sampler.vertex(eye.vertex.index, SampleSlot::Emitter);
         let near = self.caches.nearest(&eye.vertex.place.stored(), eye.vertex.wo);
         for number in 0..self.settings.samples {
             let [cache, present, ..] = sampler.rng().next_4();

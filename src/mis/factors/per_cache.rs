@@ -21,7 +21,7 @@
 use super::ris::Stages;
 use crate::math::Rgb;
 use crate::mis::factor::{ConnectionFactor, IncidentSubpath, ResamplingTarget};
-use crate::spatial::nearest::MOST as MAX_NEIGHBORS;
+use crate::spatial::nearest::MAX_NEIGHBORS;
 
 /// A cache point near an eye vertex, as one light vertex y reaches it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

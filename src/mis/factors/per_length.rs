@@ -14,7 +14,7 @@
 
 use crate::math::Rgb;
 use crate::mis::factor::{ConnectionFactor, IncidentSubpath, bounded_p_over_q, ris_factor};
-use crate::spatial::nearest::MOST as MAX_NEIGHBORS;
+use crate::spatial::nearest::MAX_NEIGHBORS;
 use std::sync::Arc;
 
 /// Pmfs besides the uniform one: seen, open, bounded.

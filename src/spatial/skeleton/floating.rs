@@ -8,7 +8,7 @@ use super::simple::{CENTRE, pieces};
 use super::voxels::{OFFSETS, VoxelGrid};
 use std::collections::VecDeque;
 
-const NOBODY: usize = usize::MAX;
+const NO_CUBE: usize = usize::MAX;
 
 /// The empty cubes, without threads from floating things to the rim or to things that hold to it. A thread that would split empty
 /// space is not made.
@@ -27,7 +27,7 @@ pub fn tie(grid: &VoxelGrid, squared: &[u32]) -> Vec<bool> {
     let neighbour = |i: usize, step: isize| i.checked_add_signed(step).filter(|&n| n < squared.len());
 
     // Breadth first from the rim; solid cubes cost nothing, so that they come before all that is empty.
-    let mut from = vec![NOBODY; object.len()];
+    let mut from = vec![NO_CUBE; object.len()];
     let mut reached = vec![false; object.len()];
     let mut queue = VecDeque::from([0]);
     reached[0] = true;
