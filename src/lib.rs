@@ -3,7 +3,7 @@
 //! The library is a row of rooms; each imports only rooms that stand before it in this list (a test enforces it):
 //!
 //! ```text
-//! math → image → scene → load → ray → shade → emit → prepared → spatial → path → mis → film → bidir → integrators → render → measure → app
+//! math → image → scene → load → ray → shade → spatial → emit → prepared → skeleton → path → mis → film → bidir → integrators → render → measure → app
 //! ```
 //!
 //! Data flows one way and can be read in `render::driver`:
@@ -23,9 +23,10 @@ pub mod scene;
 pub mod load;
 pub mod ray;
 pub mod shade;
+pub mod spatial;
 pub mod emit;
 pub mod prepared;
-pub mod spatial;
+pub mod skeleton;
 pub mod path;
 pub mod mis;
 pub mod film;

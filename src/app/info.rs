@@ -6,7 +6,7 @@ use super::{report, skeleton};
 use crate::image::{OutputFormat, Pixels};
 use crate::prepared::{PrepareOptions, PreparedScene};
 use crate::ray::Backend;
-use crate::spatial::Skeleton;
+use crate::skeleton::Skeleton;
 use std::time::Instant;
 
 fn mib(bytes: usize) -> String {

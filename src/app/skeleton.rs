@@ -5,7 +5,7 @@ use crate::image::{Layer, Picture, atomic_write, write_picture};
 use crate::math::{DVec3, Rgb, Vec3, hash::mix64};
 use crate::prepared::PreparedScene;
 use crate::ray::Ray;
-use crate::spatial::Skeleton;
+use crate::skeleton::Skeleton;
 use rayon::prelude::*;
 use std::io::{self, Write};
 use std::path::Path;

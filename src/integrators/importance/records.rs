@@ -11,7 +11,8 @@ use crate::math::{Rgb, Vec3};
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, RayStats};
 use crate::spatial::nearest::{MAX_NEIGHBORS, Metric};
-use crate::spatial::{NearestPoints, Skeleton, morton};
+use crate::skeleton::Skeleton;
+use crate::spatial::{NearestPoints, morton};
 use std::ops::Range;
 
 /// Eye sub-paths whose vertices are counted by node.

@@ -1,20 +1,20 @@
 //! The skeleton of empty space: few nodes in the middle of rooms and passages, and a map from any point to its node.
 //!
 //! What is seen from a node is much like what is seen from the surfaces around it, so that knowledge about visibility can be kept
-//! at nodes and shared by all points that belong to them (Noël and Biri 2015). The way there: [`voxels`] makes the scene
-//! solid cubes, [`visited`] closes parts that nobody sees, [`distance`] says how far each empty cube is from them, [`thinning`] leaves curves, [`graph`] leaves few nodes,
-//! [`map`] tells every empty cube its node.
+//! at nodes and shared by all points that belong to them (Noël and Biri 2015). Steps of the construction: [`voxels`] makes the scene
+//! solid cubes, [`reachable_space`] fills parts that no path reaches, [`distance`] computes each empty cube's distance to solid ones,
+//! [`thinning`] reduces empty space to curves, [`graph`] selects few nodes on them, [`map`] assigns a node to every empty cube.
 
 pub mod distance;
-pub mod floating;
+pub mod floating_components;
 pub mod graph;
 pub mod map;
+pub mod reachable_space;
 pub mod simple;
 pub mod thinning;
-pub mod visited;
 pub mod voxels;
 
-pub use visited::Places;
+pub use reachable_space::Places;
 pub use voxels::VoxelGrid;
 
 use crate::math::Vec3;
@@ -48,12 +48,12 @@ pub struct Skeleton {
 
 impl Skeleton {
     /// The skeleton of the empty space of `scene`: of the parts that hold the camera, what it sees, or a light, and without far
-    /// surroundings ([`visited`]). `cells`: cubes along the longest side; if not given, [`DEFAULT_CELLS`], or more for flat scenes
+    /// surroundings ([`reachable_space`]). `cells`: cubes along the longest side; if not given, [`DEFAULT_CELLS`], or more for flat scenes
     /// ([`VoxelGrid::suggested_cells`]). Empty if there is nothing, or nothing empty. The same for any number of threads.
     pub fn of_scene(scene: &PreparedScene, cells: Option<usize>) -> Skeleton {
-        let places = visited::places(scene);
+        let places = reachable_space::places(scene);
         let Some(bounds) = scene.geometry.bounds() else { return Skeleton::of(&scene.geometry, DEFAULT_CELLS) };
-        let region = visited::region(bounds, &places);
+        let region = reachable_space::region(bounds, &places);
         let cells = cells.unwrap_or_else(|| VoxelGrid::suggested_cells(region, DEFAULT_CELLS));
         Skeleton::of_grid(&VoxelGrid::of_region(&scene.geometry, region, cells), &places)
     }
@@ -66,7 +66,7 @@ impl Skeleton {
     /// The skeleton of the empty cubes of `grid`, whose outermost layer must be solid: of the parts that hold one of `places`, or of
     /// all if none does.
     pub fn of_grid(grid: &VoxelGrid, places: &Places) -> Skeleton {
-        let space = visited::closed_off(grid, places);
+        let space = reachable_space::closed_off(grid, places);
         let squared = distance::squared_distances(&space);
         let curve = thinning::curves(&space, &squared);
         let graph = graph::filtered(&space, &squared, &curve);

@@ -1,8 +1,9 @@
-//! Solid things that touch nothing (a hanging lamp, a book a hair above its table) are tied to the walls by threads of cubes.
+//! Solid components that touch nothing (a hanging lamp, a book a hair above its table) are connected to the walls by bridges: paths of
+//! cubes one cube thick.
 //!
-//! Space around a floating thing is a shell, and thinning a shell leaves a closed sheet: no curve has its topology. With a thread
-//! through the shell it has that of a room with a pillar. A thread is cut into the space that is thinned and nowhere else: distances
-//! and the map of nodes do not know it.
+//! Empty space around a floating component is a shell, and thinning a shell leaves a closed sheet: no curve has its topology. With a
+//! bridge through the shell it has the topology of a room with a pillar. Bridges are cut into the space that is thinned and nowhere
+//! else: neither distances nor the map of nodes contain them.
 
 use super::simple::{CENTRE, pieces};
 use super::voxels::{OFFSETS, VoxelGrid};
@@ -10,9 +11,9 @@ use std::collections::VecDeque;
 
 const NO_CUBE: usize = usize::MAX;
 
-/// The empty cubes, without threads from floating things to the rim or to things that hold to it. A thread that would split empty
-/// space is not made.
-pub fn tie(grid: &VoxelGrid, squared: &[u32]) -> Vec<bool> {
+/// The empty cubes, less bridges from floating components to the rim or to components connected to it. A bridge that would split empty
+/// space is left out. `squared` are the squared distances to solid cubes, in cubes.
+pub fn bridge(grid: &VoxelGrid, squared: &[u32]) -> Vec<bool> {
     let mut object: Vec<bool> = squared.iter().map(|&d| d > 0).collect();
     if object.is_empty() {
         return object;
@@ -31,7 +32,7 @@ pub fn tie(grid: &VoxelGrid, squared: &[u32]) -> Vec<bool> {
     let mut reached = vec![false; object.len()];
     let mut queue = VecDeque::from([0]);
     reached[0] = true;
-    let mut threads = Vec::new();
+    let mut bridge_starts = Vec::new();
     let mut solid = Vec::new();
     while let Some(i) = queue.pop_front() {
         for n in faces.iter().filter_map(|&s| neighbour(i, s)) {
@@ -43,9 +44,9 @@ pub fn tie(grid: &VoxelGrid, squared: &[u32]) -> Vec<bool> {
                 queue.push_back(n);
                 continue;
             }
-            // All of the thing that has been met joins the front. Where it was met from empty space, a thread is due.
+            // The whole component joins the front. Where the front met it from empty space, a bridge starts.
             if object[i] {
-                threads.push(i);
+                bridge_starts.push(i);
             }
             solid.push(n);
             while let Some(s) = solid.pop() {
@@ -59,13 +60,13 @@ pub fn tie(grid: &VoxelGrid, squared: &[u32]) -> Vec<bool> {
             }
         }
     }
-    for start in threads {
+    for start in bridge_starts {
         cut(grid, &steps, &from, &mut object, start);
     }
     object
 }
 
-/// Takes the thread from `start` back to the first solid cube out of `object`, if that splits nothing.
+/// Removes the bridge from `start` back to the first solid cube from `object`, unless that splits empty space.
 fn cut(grid: &VoxelGrid, steps: &[isize; 26], from: &[usize], object: &mut [bool], start: usize) {
     let mut done = Vec::new();
     let mut i = start;

@@ -1,7 +1,7 @@
-//! Which parts of empty space matter: those that hold the camera, what it sees, or a light.
+//! Reachable parts of empty space: those that hold the camera, a point it sees, or a light.
 //!
-//! A house may stand on a wide ground, on which most cubes of a grid would be wasted: the grid ends not far beyond what is seen. Points
-//! outside of it have no node.
+//! A house may stand on a wide ground, on which most cubes of a grid would be wasted: the grid ends not far beyond the visible points.
+//! Points outside of the grid have no node.
 //!
 //! Walls, columns and cupboards of real scenes are hollow, and cavities may be larger than rooms together; as closed parts of empty space
 //! they would have more nodes than the rooms. Paths hardly ever get there. Where one does after all (through glass, through a gap

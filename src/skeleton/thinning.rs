@@ -10,7 +10,7 @@
 //! coordinates have the same parities. Two of those never touch, so that a turn is decided in parallel and its result does not depend
 //! on any order.
 
-use super::floating::tie;
+use super::floating_components::bridge;
 use super::simple::{CENTRE, is_border, is_simple, pieces};
 use super::voxels::VoxelGrid;
 use rayon::prelude::*;
@@ -24,7 +24,7 @@ const CHUNK: usize = 2048;
 
 /// Cubes of the curves, in ascending order of their numbers. `squared` are the squared distances to what is solid, in cubes.
 pub fn curves(grid: &VoxelGrid, squared: &[u32]) -> Vec<usize> {
-    let mut object = tie(grid, squared);
+    let mut object = bridge(grid, squared);
     let layers: Vec<u16> = squared.iter().map(|&d| (f64::from(d).sqrt() * LAYERS_PER_CUBE).floor() as u16).collect();
     thin(grid, &mut object, &layers, |i| squared[i] >= WIDE);
     (0..object.len()).filter(|&i| object[i]).collect()
