@@ -1,12 +1,12 @@
 //! Mathematics without any project types: colours, frames, warps with densities and inverses, hashed random streams,
 //! discrete and piecewise distributions, error-bounded floats, statistics.
 
+pub mod cdf;
 pub mod discrete;
 pub mod erf;
 pub mod float;
 pub mod frame;
 pub mod fresnel;
-pub mod guided;
 pub mod hash;
 pub mod measure;
 pub mod piecewise;

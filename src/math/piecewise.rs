@@ -1,8 +1,8 @@
 //! Continuous distributions over the unit interval and square whose density is interpolated linearly between nodes: exact
 //! sampling, density and inverse. Unlike piecewise constant ones they are positive wherever an interpolated picture is.
 
+use super::cdf::CdfRows;
 use super::float::ONE_MINUS_EPSILON;
-use super::guided::GuidedRows;
 use std::ops::Range;
 
 /// The s in [0, 1] below which the fraction `r` of the mass under a linear density from `a` to `b` lies.
@@ -132,8 +132,8 @@ fn find_cell(cells: Range<usize>, target: f64, cdf: impl Fn(usize) -> f64) -> us
 /// of the random numbers, so that stratified numbers give stratified cells.
 #[derive(Clone, Debug)]
 pub struct CellGrid {
-    rows: GuidedRows,
-    columns: GuidedRows,
+    rows: CdfRows,
+    columns: CdfRows,
     total: f64,
 }
 
@@ -143,9 +143,9 @@ impl CellGrid {
         if cells[0] == 0 || cells[1] == 0 {
             return None;
         }
-        let mut columns = GuidedRows::new(cells[0], cells[1]);
+        let mut columns = CdfRows::new(cells[0], cells[1]);
         let masses: Vec<f64> = (0..cells[1]).map(|j| columns.push(|i| mass(i, j))).collect();
-        let mut rows = GuidedRows::new(cells[1], 1);
+        let mut rows = CdfRows::new(cells[1], 1);
         let total = rows.push(|j| masses[j]);
         (total > 0.0).then_some(CellGrid { rows, columns, total })
     }

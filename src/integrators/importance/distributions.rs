@@ -16,7 +16,7 @@
 //!
 //! All but the uniform one, which alone reaches everything, can be switched off.
 
-use crate::math::guided::GuidedRows;
+use crate::math::cdf::CdfRows;
 
 /// Pmfs that are combined.
 const DISTRIBUTIONS: usize = 4;
@@ -47,7 +47,7 @@ fn scale(sum: f64) -> f64 {
 }
 
 /// Combines pmfs, each given up to a factor, by the max heuristic into a new row of probabilities.
-pub(super) fn by_max(weights: [&[f32]; DISTRIBUTIONS - 1], rows: &mut GuidedRows) -> Sums {
+pub(super) fn by_max(weights: [&[f32]; DISTRIBUTIONS - 1], rows: &mut CdfRows) -> Sums {
     let n = weights[0].len();
     let sums = sums_of(weights);
     let scales = sums.map(scale);
@@ -86,7 +86,7 @@ pub(super) fn mixture([seen, open, _]: Sums) -> [f64; 2] {
 }
 
 /// Combines them as a mixture.
-pub(super) fn by_mixture(weights: [&[f32]; DISTRIBUTIONS - 1], rows: &mut GuidedRows) -> Sums {
+pub(super) fn by_mixture(weights: [&[f32]; DISTRIBUTIONS - 1], rows: &mut CdfRows) -> Sums {
     let sums = sums_of(weights);
     let shares = mixture(sums);
     let [seen, open, _] = weights;
@@ -99,11 +99,11 @@ pub(super) fn by_mixture(weights: [&[f32]; DISTRIBUTIONS - 1], rows: &mut Guided
 mod tests {
     use super::*;
 
-    type Combine = fn([&[f32]; 3], &mut GuidedRows) -> Sums;
+    type Combine = fn([&[f32]; 3], &mut CdfRows) -> Sums;
 
     fn probabilities(combine: Combine, weights: [&[f32]; 3]) -> Vec<f32> {
         let n = weights[0].len();
-        let mut rows = GuidedRows::new(n, 1);
+        let mut rows = CdfRows::new(n, 1);
         combine(weights, &mut rows);
         (0..n).map(|i| rows.probability(0, i)).collect()
     }

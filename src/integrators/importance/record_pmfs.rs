@@ -10,7 +10,7 @@ use super::distributions::{Distribution, Sums, by_max, by_mixture};
 use super::records::ImportanceRecords;
 use crate::bidir::VertexStore;
 use crate::math::Vec3;
-use crate::math::guided::GuidedRows;
+use crate::math::cdf::CdfRows;
 use crate::path::Iteration;
 use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
@@ -79,7 +79,7 @@ pub(super) struct RecordPmfs {
 #[derive(Debug, Default)]
 struct Group {
     /// For each class, the pmf of its vertices at each record.
-    rows: Vec<GuidedRows>,
+    rows: Vec<CdfRows>,
     /// For each record and class the sums of the weights of seen, open and bounded.
     sums: Vec<Sums>,
 }
@@ -110,7 +110,7 @@ impl RecordPmfs {
             let mut tracer = iteration.tracer();
             weights.find(&Source { records, group, store, vertices, scheme }, &mut tracer);
             rows.clear();
-            rows.extend(classes.iter().map(|class| GuidedRows::new(class.range.len(), group.len())));
+            rows.extend(classes.iter().map(|class| CdfRows::new(class.range.len(), group.len())));
             sums.clear();
             for record in 0..group.len() {
                 for (class, rows) in classes.iter().zip(&mut *rows) {
