@@ -6,7 +6,8 @@ use super::vertex::LightVertex;
 use crate::math::Vec3;
 use crate::mis::{EmitterFactors, VertexPdfs};
 use crate::shade::{BsdfPool, BsdfRef};
-use crate::spatial::{PointTree, morton};
+use crate::spatial::light_tree::WeightedPoint;
+use crate::spatial::{VplTree, morton};
 use rayon::prelude::*;
 
 /// Light sub-paths, cut at every vertex that can be connected to.
@@ -19,7 +20,7 @@ pub struct VertexStore {
     /// When finished, all vertices in an order that keeps neighbours in space together.
     vertices: Vec<StoredVertex>,
     /// Tree over the vertices, weighed by the luminance of f_y/p.
-    pub tree: PointTree,
+    pub tree: VplTree,
     order: SpatialOrder,
 }
 
@@ -33,7 +34,7 @@ struct SpatialOrder {
     keys: Vec<(u32, u32)>,
     codes: Vec<u32>,
     /// Positions in Morton order, with weights.
-    points: Vec<(Vec3, f32)>,
+    points: Vec<WeightedPoint>,
 }
 
 /// The light sub-paths of one piece of work.
@@ -90,10 +91,11 @@ impl VertexStore {
             keys.par_iter().map(|&(code, _)| code).collect_into_vec(codes);
             let weighed = |v: &StoredVertex| {
                 let weight = v.vertex.throughput.luminance();
-                (v.vertex.place.position(), if weight.is_finite() { weight } else { 0.0 })
+                let weight = if weight.is_finite() { weight } else { 0.0 };
+                WeightedPoint { p: v.vertex.place.position(), weight }
             };
             self.vertices.par_iter().map(weighed).collect_into_vec(points);
-            self.tree.build(codes, points);
+            self.tree.build_morton(codes, points);
         }
     }
 

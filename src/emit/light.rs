@@ -5,6 +5,8 @@ use super::environment::EnvironmentLight;
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::triangle::TriangleLight;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
+use crate::spatial::light_tree::{Aabb, Cone, LightBounds};
+use std::f32::consts::{FRAC_PI_2, PI};
 
 /// A light.
 #[derive(Clone, Debug)]
@@ -111,6 +113,24 @@ impl Light {
             Light::Directional(l) => l.power(),
             Light::Environment(l) => l.power(),
         }
+    }
+
+    /// Bounds of the light's extent and emission; `None` if it is at infinity or has no power.
+    pub fn bounds(&self) -> Option<LightBounds> {
+        let power = self.power();
+        if !(power > 0.0 && power.is_finite()) {
+            return None;
+        }
+        let (aabb, cone) = match self {
+            Light::Triangle(l) => (Aabb::of(l.corners()), Cone { axis: l.ng(), half_angle: 0.0, emission: FRAC_PI_2 }),
+            Light::Point(l) => (Aabb::of([l.position()]), Cone { axis: Vec3::Z, half_angle: PI, emission: FRAC_PI_2 }),
+            // Nearly uniform inside: the whole cone counts as normals, and nothing lies beyond.
+            Light::Spot(l) => {
+                (Aabb::of([l.position()]), Cone { axis: l.axis(), half_angle: l.cutoff(), emission: 1e-3 })
+            }
+            Light::Directional(_) | Light::Environment(_) => return None,
+        };
+        Some(LightBounds { aabb, cone, power })
     }
 
     /// True if the light is at infinity: rays that escape from the scene may see it.

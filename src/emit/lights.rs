@@ -1,13 +1,16 @@
 //! All lights of a scene, and the sampling of one.
 //!
 //! Light sub-paths sample a light in proportion to power. Direct light samples one for the point that is lit: lights with a position by a
-//! [`LightTree`] when there are more than [`LIGHT_TREE_MIN`], lights at infinity with a probability of their own, since their power (it
+//! [`WideLightTree`] unless they are few, lights at infinity with a probability of their own, since their power (it
 //! grows with the scene's size) does not tell how much arrives at a point.
 
 use super::light::Light;
-use super::light_tree::LightTree;
-use crate::math::discrete::{AliasTable, Cdf};
+use crate::math::cdf::PrefixSums;
+use crate::math::discrete::AliasTable;
+use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Pmf, Vec3};
+use crate::spatial::light_tree::{OrientedSource, WideLightTree};
+use std::ops::Range;
 
 /// Index of a light in its [`LightSet`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -32,15 +35,15 @@ pub struct LightSet {
 /// Probabilities for a lit point, where they differ from those by power.
 #[derive(Debug)]
 struct Direct {
-    tree: LightTree,
+    tree: WideLightTree,
     /// Probability of sampling one of the lights at infinity.
     infinite_share: f32,
     /// Lights at infinity by power; the probability of all other lights is zero.
-    infinite: Cdf,
+    infinite: PrefixSums,
 }
 
-/// Up to so many lights with a position are sampled by power alone, if none is at infinity.
-const LIGHT_TREE_MIN: usize = 4;
+/// Fewest lights with a position for which a tree is built if no light is at infinity; fewer are sampled by power alone.
+const LIGHT_TREE_MIN: usize = 5;
 
 impl Direct {
     fn new(lights: &[Light], powers: &[f32]) -> Option<Direct> {
@@ -48,20 +51,32 @@ impl Direct {
             lights.iter().zip(powers).filter(|(l, p)| l.is_infinite() == infinite && **p > 0.0).count()
         };
         let (near, far) = (count(false), count(true));
-        if near == 0 || (far == 0 && near <= LIGHT_TREE_MIN) {
+        if near == 0 || (far == 0 && near < LIGHT_TREE_MIN) {
             return None;
         }
-        let far_powers: Vec<f32> =
-            lights.iter().zip(powers).map(|(l, &p)| if l.is_infinite() { p } else { 0.0 }).collect();
+        let far_power = |(l, &p): (&Light, &f32)| if l.is_infinite() && p.is_finite() { p.max(0.0) } else { 0.0 };
+        let infinite = PrefixSums::new(lights.iter().zip(powers).map(far_power));
         let infinite_share = far as f32 / (far + 1) as f32;
-        Some(Direct { tree: LightTree::new(lights), infinite_share, infinite: Cdf::new(&far_powers) })
+        let source = |(i, light): (usize, &Light)| Some(OrientedSource { index: i as u32, bounds: light.bounds()? });
+        let tree = WideLightTree::new(lights.iter().enumerate().filter_map(source).collect());
+        Some(Direct { tree, infinite_share, infinite })
+    }
+
+    /// All indices of lights.
+    fn all(&self) -> Range<usize> {
+        0..self.infinite.len()
+    }
+
+    /// Probability of a light at infinity.
+    fn pmf_infinite(&self, id: LightId) -> Pmf {
+        Pmf(self.infinite.pmf(&self.all(), id.index()) as f32) * Pmf(self.infinite_share)
     }
 
     fn sample(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(LightId, Pmf)> {
         let share = self.infinite_share;
         if u < share {
-            let (i, pmf, _) = self.infinite.sample(u / share)?;
-            Some((LightId(i as u32), pmf * Pmf(share)))
+            let id = LightId(self.infinite.sample(&self.all(), f64::from((u / share).min(ONE_MINUS_EPSILON)))? as u32);
+            Some((id, self.pmf_infinite(id)))
         } else {
             let (i, pmf) = self.tree.sample(p, n, (u - share) / (1.0 - share))?;
             Some((LightId(i), pmf * Pmf(1.0 - share)))
@@ -144,9 +159,7 @@ impl LightSet {
     pub fn pmf_light_from(&self, p: Vec3, n: Option<Vec3>, id: LightId) -> Pmf {
         match &self.direct {
             None => self.pmf_light(id),
-            Some(d) if self.lights.get(id.index()).is_some_and(Light::is_infinite) => {
-                d.infinite.pmf(id.index()) * Pmf(d.infinite_share)
-            }
+            Some(d) if self.lights.get(id.index()).is_some_and(Light::is_infinite) => d.pmf_infinite(id),
             Some(d) => d.tree.pmf(p, n, id.0) * Pmf(1.0 - d.infinite_share),
         }
     }

@@ -11,8 +11,6 @@ pub mod environment;
 pub mod envmap;
 pub mod filter;
 pub mod light;
-mod light_bounds;
-pub mod light_tree;
 pub mod lights;
 mod orientation;
 pub mod sample;

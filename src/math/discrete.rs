@@ -1,6 +1,5 @@
-//! Distributions over finitely many choices.
+//! Alias tables. Distributions as cumulative sums are in [`super::cdf`].
 
-use super::float::ONE_MINUS_EPSILON;
 use super::measure::Pmf;
 
 /// Constant-time choice with given probabilities (Walker 1974; built by Vose's method, 1991).
@@ -91,58 +90,6 @@ impl AliasTable {
     }
 }
 
-/// Choice by a cumulative sum: logarithmic time, but monotone in the random number, so stratified numbers give stratified
-/// choices, and the number can be used again.
-#[derive(Clone, Debug, Default)]
-pub struct Cdf {
-    /// cdf[i] is the probability of a choice below i + 1; the last is 1.
-    cdf: Vec<f64>,
-    total: f64,
-}
-
-impl Cdf {
-    /// For `weights`; negative, NaN and infinite weights count as zero.
-    pub fn new(weights: &[f32]) -> Cdf {
-        let mut sum = 0.0;
-        let mut cdf: Vec<f64> = weights
-            .iter()
-            .map(|&w| {
-                sum += if w.is_finite() && w > 0.0 { f64::from(w) } else { 0.0 };
-                sum
-            })
-            .collect();
-        if sum > 0.0 {
-            cdf.iter_mut().for_each(|c| *c /= sum);
-        }
-        Cdf { cdf, total: sum }
-    }
-
-    /// Sum of the weights.
-    pub fn total(&self) -> f64 {
-        self.total
-    }
-
-    /// A choice for `u` in [0, 1), its probability, and a new number in [0, 1); `None` if all weights are zero.
-    pub fn sample(&self, u: f32) -> Option<(usize, Pmf, f32)> {
-        if self.total <= 0.0 {
-            return None;
-        }
-        let u = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON));
-        let i = self.cdf.partition_point(|&c| c <= u).min(self.cdf.len() - 1);
-        let below = if i == 0 { 0.0 } else { self.cdf[i - 1] };
-        let p = self.cdf[i] - below;
-        Some((i, Pmf(p as f32), (((u - below) / p) as f32).clamp(0.0, ONE_MINUS_EPSILON)))
-    }
-
-    /// Probability of choice `i`; zero outside.
-    pub fn pmf(&self, i: usize) -> Pmf {
-        match self.cdf.get(i) {
-            Some(&c) if self.total > 0.0 => Pmf((c - if i == 0 { 0.0 } else { self.cdf[i - 1] }) as f32),
-            _ => Pmf(0.0),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,26 +99,21 @@ mod tests {
         /// On a regular grid the share of each choice is its probability up to the grid's resolution.
         #[test]
         fn frequencies_are_the_probabilities(weights in prop::collection::vec(prop_oneof![Just(0.0f32), 0.0f32..10.0], 1..20)) {
-            let (alias, cdf) = (AliasTable::new(&weights), Cdf::new(&weights));
+            let alias = AliasTable::new(&weights);
             let total: f32 = weights.iter().sum();
             prop_assume!(total > 0.0);
             let n = 20_000;
-            let mut count = vec![[0u32; 2]; weights.len()];
+            let mut count = vec![0u32; weights.len()];
             for k in 0..n {
                 let u = (k as f32 + 0.5) / n as f32;
                 let (i, p) = alias.sample(u).unwrap();
-                count[i][0] += 1;
+                count[i] += 1;
                 prop_assert!((p.0 - weights[i] / total).abs() < 1e-6);
-                let (j, q, rest) = cdf.sample(u).unwrap();
-                count[j][1] += 1;
-                prop_assert!((q.0 - weights[j] / total).abs() < 1e-6 && (0.0..1.0).contains(&rest));
             }
             for (i, &w) in weights.iter().enumerate() {
                 prop_assert_eq!(alias.pmf(i).0 == 0.0, w == 0.0);
-                for c in count[i] {
-                    prop_assert!((c as f32 / n as f32 - w / total).abs() < 40.0 / n as f32);
-                    prop_assert!(w > 0.0 || c == 0);
-                }
+                prop_assert!((count[i] as f32 / n as f32 - w / total).abs() < 40.0 / n as f32);
+                prop_assert!(w > 0.0 || count[i] == 0);
             }
         }
     }
@@ -180,7 +122,6 @@ mod tests {
     fn hopeless_weights_give_nothing() {
         for weights in [vec![], vec![0.0], vec![f32::NAN, -1.0, f32::INFINITY]] {
             assert!(AliasTable::new(&weights).sample(0.3).is_none());
-            assert!(Cdf::new(&weights).sample(0.3).is_none());
             assert_eq!(AliasTable::new(&weights).pmf(0), Pmf(0.0));
         }
     }

@@ -1,8 +1,8 @@
 //! Points in space: clusters of light sources, nearest points, and an order that keeps neighbours together.
 
+pub mod light_tree;
 pub mod morton;
 pub mod nearest;
-pub mod point_tree;
 
+pub use light_tree::{LightTree, VplTree};
 pub use nearest::NearestPoints;
-pub use point_tree::PointTree;

@@ -10,8 +10,8 @@ use crate::bidir::vertex::direction_to;
 use crate::math::{Rgb, Vec3};
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, RayStats};
-use crate::spatial::nearest::{MAX_NEIGHBORS, Metric};
 use crate::skeleton::Skeleton;
+use crate::spatial::nearest::{MAX_NEIGHBORS, Metric};
 use crate::spatial::{NearestPoints, morton};
 use std::ops::Range;
 

@@ -16,8 +16,8 @@ use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, RayStats};
 use crate::shade::{BsdfPool, KeptBsdf, Transport};
 use crate::spatial::NearestPoints;
+use crate::spatial::light_tree::ReceiverBounds;
 use crate::spatial::nearest::MAX_NEIGHBORS;
-use crate::spatial::point_tree::ReceiverBounds;
 use std::ops::Range;
 
 /// Radii of a group beyond which its points say nothing about visibility.

@@ -18,7 +18,7 @@ use crate::math::hash::HashRng;
 use crate::path::{Iteration, streams};
 use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
-use crate::spatial::point_tree::CutScratch;
+use crate::spatial::light_tree::{CutLimits, CutScratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -138,10 +138,11 @@ impl GroupPmf {
         rng: &mut HashRng,
         memory: &mut CutScratch,
     ) {
-        store.tree.cut(&caches.receiver_bounds(group), clusters, memory, &mut self.ranges);
+        let limits = CutLimits { max_clusters: clusters, max_error: 0.0 };
+        store.tree.cut(&caches.receiver_bounds(group), limits, memory, &mut self.ranges);
         self.entries.clear();
         self.entries.extend(self.ranges.iter().filter_map(|cluster| {
-            let (vertex, p) = store.tree.draw(cluster, rng.next_f32())?;
+            let (vertex, p) = store.tree.sample_in(cluster, rng.next_f32())?;
             Some(Entry { vertex: vertex as u32, inv_p1: (1.0 / p) as f32 })
         }));
     }

@@ -184,7 +184,7 @@ impl<F: CacheFactor> CacheStrategy<F> {
             let vertex = ((u * all as f32) as usize).min(all - 1);
             return Some(Selection { entry: vertex, vertex, probability: 1.0 / all as f32 });
         }
-        let (vertex, p) = store.tree.draw(&(0..all), u)?;
+        let (vertex, p) = store.tree.sample_in(&(0..all), u)?;
         Some(Selection { entry: vertex, vertex, probability: p as f32 })
     }
 
