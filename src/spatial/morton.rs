@@ -3,34 +3,34 @@
 use crate::math::Vec3;
 use rayon::prelude::*;
 
-/// Spreads the lower ten bits of `x` three apart.
-fn spread(x: u32) -> u32 {
+/// Moves the lower ten bits of `x` three apart.
+fn dilate(x: u32) -> u32 {
     let x = (x | x << 16) & 0x0300_00ff;
     let x = (x | x << 8) & 0x0300_f00f;
     let x = (x | x << 4) & 0x030c_30c3;
     (x | x << 2) & 0x0924_9249
 }
 
-/// Place of `p` on the curve through the box from `lo` to `hi`; points outside count as on its faces.
+/// Morton code of `p` in the box from `lo` to `hi`, 30 bits; points outside are moved to its faces.
 pub fn code(p: Vec3, lo: Vec3, hi: Vec3) -> u32 {
     let size = (hi - lo).max(Vec3::splat(f32::MIN_POSITIVE));
     let cell = ((p - lo) / size * 1024.0).clamp(Vec3::ZERO, Vec3::splat(1023.0));
-    // A point that is not a number goes to the first cell.
-    spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2
+    // Coordinates that are not numbers become 0.
+    dilate(cell.x as u32) | dilate(cell.y as u32) << 1 | dilate(cell.z as u32) << 2
 }
 
 fn bounds(points: &[Vec3]) -> [Vec3; 2] {
     [points.iter().copied().fold(Vec3::INFINITY, Vec3::min), points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max)]
 }
 
-/// Places of `points` on the curve through the box around them, each with the number of its point, in Morton order.
+/// Morton codes of `points` in the box around them, each with the number of its point, in ascending order.
 pub fn sorted(points: &[Vec3]) -> Vec<(u32, u32)> {
     let mut keys = vec![];
     sort(points, &mut keys);
     keys
 }
 
-/// The same in memory that is there already.
+/// [`sorted`] into `keys`, whose memory is used again.
 pub fn sort(points: &[Vec3], keys: &mut Vec<(u32, u32)>) {
     let [lo, hi] = bounds(points);
     let key = |(i, p): (usize, &Vec3)| (code(*p, lo, hi), i as u32);

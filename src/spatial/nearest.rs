@@ -1,37 +1,38 @@
-//! The few points of a fixed set that are nearest to a place on a surface, on its own side.
+//! Nearest neighbours of a surface point among a fixed set of oriented points.
 //!
-//! The answer is wanted for every vertex of every sub-path, so it is looked up and not searched: space is cut into cells, each with
-//! one slot for each of six directions that a surface may face, and a slot is searched (from the middle of its cell) when it is
-//! first asked for. The answer is thus a function of the cell and the facing alone: the same for any order of questions.
+//! Every vertex of every sub-path queries, so results are cached: space is divided into cells, each with one slot for each of six
+//! directions that a surface may face, and a slot is filled by a search from the middle of its cell at its first query. The result is a
+//! function of cell and facing alone, whatever the order of queries.
 //!
-//! Points whose surface faces another way count as far, unless told otherwise: a point on the other side of a thin wall is near, but sees
-//! another room.
+//! With [`Metric::Facing`] only points whose surface faces about the same way are found: a point on the other side of a thin wall is near,
+//! but sees another room.
 
 use crate::math::Vec3;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Most neighbours that are found.
+/// Largest number of neighbours that a query returns.
 pub const MAX_NEIGHBORS: usize = 3;
 /// Cells along the longest side of the box around the points.
 const CELLS: usize = 96;
-/// Bits of a point's number; all of them set: no point.
+/// Bits of a point's number.
 const BITS: u32 = 21;
+/// Number in slots with fewer neighbours than [`MAX_NEIGHBORS`].
 const NO_POINT: u64 = (1 << BITS) - 1;
-/// Slots hold this bit when they have been searched.
+/// Set in slots that have been filled.
 const KNOWN: u64 = 1 << 63;
 
-/// Which points are near.
+/// Which points are candidates, by distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Metric {
-    /// Those whose surface faces about the same way, by their distance.
+    /// Points whose surface faces about the same way.
     Facing,
-    /// All, by their distance.
+    /// All points.
     Plain,
 }
 
 impl Metric {
-    /// The kind of surface that `n` belongs to; points of different kinds have different neighbours.
+    /// Kind of surfaces with the normal `n`; points of different kinds have different neighbours.
     #[inline]
     pub fn kind(self, n: Vec3) -> usize {
         match self {
@@ -40,7 +41,7 @@ impl Metric {
         }
     }
 
-    /// Whether a point with the normal `n` is found by those of a kind.
+    /// True if a point with the normal `n` is a candidate for surface points of a kind.
     fn finds(self, n: Vec3, kind: usize) -> bool {
         self == Metric::Plain || faces(n, kind)
     }
@@ -58,11 +59,11 @@ pub struct NearestPoints {
     per_cell: f32,
     cells: [usize; 3],
     slots: Vec<AtomicU64>,
-    /// For each point, its group, if neighbours must be of one.
+    /// For each point its group, if all neighbours must be of one group.
     groups: Option<Vec<Range<usize>>>,
 }
 
-/// Which of ±x, ±y, ±z `n` is nearest to.
+/// Number of the direction among ±x, ±y, ±z that is closest to `n`.
 fn facing(n: Vec3) -> usize {
     let a = n.abs();
     let axis = if a.x >= a.y && a.x >= a.z {
@@ -80,7 +81,7 @@ fn direction(facing: usize) -> Vec3 {
     [Vec3::X, Vec3::Y, Vec3::Z][facing / 2] * sign
 }
 
-/// Whether a point with the normal `n` is found by those that face that way.
+/// True if the normal `n` is within about 78° of the direction `facing`.
 fn faces(n: Vec3, facing: usize) -> bool {
     n.dot(direction(facing)) > 0.2
 }
@@ -100,7 +101,7 @@ fn build_tree(points: &[Vec3], numbers: &mut [u32], axis: usize) {
     build_tree(points, &mut right[1..], (axis + 1) % 3);
 }
 
-/// The nearest so far, sorted by distance.
+/// The nearest points so far, sorted by distance.
 struct Best {
     distance2: [f32; MAX_NEIGHBORS],
     number: [u64; MAX_NEIGHBORS],
@@ -190,7 +191,7 @@ impl NearestPoints {
         let mut found = slot.load(Ordering::Relaxed);
         if found == 0 {
             found = self.search(cell, facing);
-            // Whoever else searched found the same.
+            // Threads that fill the same slot at once find the same.
             slot.store(found, Ordering::Relaxed);
         }
         (0..MAX_NEIGHBORS as u32)

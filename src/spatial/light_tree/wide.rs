@@ -190,7 +190,7 @@ pub struct WideLightTree {
     /// The root of the binary tree is the only child of the first node; every other node comes after its parent.
     nodes: Vec<WideNode>,
     /// By index of the source; `None` for indices without a source.
-    places: Vec<Option<Place>>,
+    leaves: Vec<Option<LeafPath>>,
     /// Indices of the sources in the order of the leaves.
     order: Vec<u32>,
     /// Sums of powers in that order.
@@ -198,7 +198,7 @@ pub struct WideLightTree {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct LeafPath {
     /// The child to take at each node from the root on, three bits each, the lowest first.
     path: u64,
     /// Position in the order of the leaves.
@@ -243,7 +243,7 @@ impl<P: Power> Widening<'_, P> {
         let binary = &self.binary.nodes[node];
         if binary.is_leaf() {
             let index = self.wide.order[binary.first as usize] as usize;
-            self.wide.places[index] = Some(Place { path, position: binary.first });
+            self.wide.leaves[index] = Some(LeafPath { path, position: binary.first });
             return;
         }
         let number = self.wide.nodes.len();
@@ -262,8 +262,8 @@ impl WideLightTree {
         let mut binary = LightTree::default();
         binary.build(&mut sources, &SaohSplit { max_depth: MAX_SAOH_DEPTH }, 1);
         let order: Vec<u32> = sources.iter().map(|s| s.index).collect();
-        let places = vec![None; order.iter().max().map_or(0, |&last| last as usize + 1)];
-        let wide = WideLightTree { nodes: Vec::new(), places, order, weights: binary.weights.clone() };
+        let leaves = vec![None; order.iter().max().map_or(0, |&last| last as usize + 1)];
+        let wide = WideLightTree { nodes: Vec::new(), leaves, order, weights: binary.weights.clone() };
         let mut widening = Widening { binary: &binary, wide };
         if let Some(root) = binary.nodes.first() {
             let mut first = WideNode::default();
@@ -300,7 +300,7 @@ impl WideLightTree {
 
     /// Probability with which [`WideLightTree::sample`] draws the source with the index `index` for the same `p` and `n`.
     pub fn pmf(&self, p: Vec3, n: Option<Vec3>, index: u32) -> Pmf {
-        let Some(Some(Place { mut path, position })) = self.places.get(index as usize).copied() else {
+        let Some(Some(LeafPath { mut path, position })) = self.leaves.get(index as usize).copied() else {
             return Pmf(0.0);
         };
         let (mut node, mut lane, mut pmf) = (&self.nodes[0], 0, 1.0);
