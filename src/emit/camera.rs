@@ -1,16 +1,16 @@
 //! Perspective cameras with a pinhole or a thin lens, from both ends: rays into the scene, and connections to the lens.
 //!
-//! Measures. Raster coordinates are in pixels of the full film, (0, 0) at the top left. A camera ray is drawn with a lens point
-//! uniform in area (1 / A; a pinhole counts as A = 1, its density is discrete) and a raster position uniform in its pixel
-//! (density 1 per pixel area). With N pixels on the film, whose image at distance one along the axis has the area F, the
-//! direction has the density N / (F cos³θ) per steradian; it is the same for every lens point, since the plane in focus is
-//! parallel to the film. The importance of the film is
+//! Measures. Raster coordinates are in pixels of the full film, (0, 0) at the top left. A camera ray is drawn with a
+//! lens point uniform in area (1 / A; a pinhole counts as A = 1, its density is discrete) and a raster position uniform
+//! in its pixel (density 1 per pixel area). With N pixels on the film, whose image at distance one along the axis has
+//! the area F, the direction has the density N / (F cos³θ) per steradian; it is the same for every lens point, since
+//! the plane in focus is parallel to the film. The importance of the film is
 //!
 //! W_e = N / (A F cos⁴θ), so that ∫∫ W_e cos θ dω dA over the rays of one pixel is 1:
 //!
-//! a pixel measures the mean radiance over its area, and a camera ray drawn as above has throughput W_e cos θ / (p_A p_ω) = 1.
-//! Over the whole film the integral is N: a light image divides by the number of light sub-paths and nothing else.
-//! (Veach 1997, §4.3.2; Pharr et al. 2016, §16.1.1, where N = 1.)
+//! a pixel measures the mean radiance over its area, and a camera ray drawn as above has throughput W_e cos θ / (p_A
+//! p_ω) = 1. Over the whole film the integral is N: a light image divides by the number of light sub-paths and nothing
+//! else. (Veach 1997, §4.3.2; Pharr et al. 2016, §16.1.1, where N = 1.)
 
 use super::orientation::Orientation;
 use super::{EmitError, PixelFilter, in_range};
@@ -51,8 +51,8 @@ pub struct LensSample {
     pub importance: f32,
     /// Density of the lens point per unit area; 1 for a pinhole.
     pub pdf: AreaPdf,
-    /// W_e · cos / (distance² · pdf): times the throughput and the cosine weighted BSDF at the point, and divided by the number of
-    /// light sub-paths, it is the pixel's value.
+    /// W_e · cos / (distance² · pdf): times the throughput and the cosine weighted BSDF at the point, and divided by
+    /// the number of light sub-paths, it is the pixel's value.
     pub weight: f32,
 }
 
@@ -230,9 +230,9 @@ impl Camera {
         })
     }
 
-    /// Connects a point of the lens to infinity in the unit direction `direction` from the camera; `None` if that direction is not in
-    /// the picture. The weight has no distance: W_e · cos / pdf. `distance` is what lies between the clipping planes: only things on
-    /// that way, from `p_near` on, can block the view.
+    /// Connects a point of the lens to infinity in the unit direction `direction` from the camera; `None` if that
+    /// direction is not in the picture. The weight has no distance: W_e · cos / pdf. `distance` is what lies between
+    /// the clipping planes: only things on that way, from `p_near` on, can block the view.
     pub fn sample_lens_at_infinity(&self, direction: Vec3, u: [f32; 2]) -> Option<LensSample> {
         let lens = self.lens_point(u);
         let d = self.orientation.to_local(direction);
@@ -259,14 +259,14 @@ impl Camera {
         })
     }
 
-    /// Densities of a ray that [`Camera::sample_ray`] drew: of its lens point per unit area (1 for a pinhole) and of its direction
-    /// per steradian.
+    /// Densities of a ray that [`Camera::sample_ray`] drew: of its lens point per unit area (1 for a pinhole) and of
+    /// its direction per steradian.
     pub fn pdf_sampled_ray(&self, direction: Vec3) -> (AreaPdf, SolidAnglePdf) {
         (self.pdf_lens(), SolidAnglePdf(self.direction_density(self.axis().dot(direction))))
     }
 
-    /// Densities of a camera ray from the lens point `origin` in the unit direction `direction`: of the lens point per unit area
-    /// (1 for a pinhole) and of the direction per steradian (zero outside of the picture).
+    /// Densities of a camera ray from the lens point `origin` in the unit direction `direction`: of the lens point per
+    /// unit area (1 for a pinhole) and of the direction per steradian (zero outside of the picture).
     pub fn pdf_ray(&self, origin: Vec3, direction: Vec3) -> (AreaPdf, SolidAnglePdf) {
         let d = self.orientation.to_local(direction);
         if d.z > 0.0 && self.reaches_picture(self.raster(self.orientation.to_local(origin - self.position), d)) {

@@ -85,7 +85,8 @@ impl PointLight {
     }
 }
 
-/// A point that shines into a cone: full strength up to one angle, then falling linearly in the angle to zero (Mitsuba's `spot`).
+/// A point that shines into a cone: full strength up to one angle, then falling linearly in the angle to zero
+/// (Mitsuba's `spot`).
 #[derive(Clone, Debug)]
 pub struct SpotLight {
     position: Vec3,
@@ -182,8 +183,8 @@ pub struct DirectionalLight {
 }
 
 impl DirectionalLight {
-    /// Travelling in the world direction `direction` through a scene whose bounding sphere around its centre has the radius
-    /// `scene_radius`; `irradiance` in W/m² on a surface that faces it.
+    /// Travelling in the world direction `direction` through a scene whose bounding sphere around its centre has the
+    /// radius `scene_radius`; `irradiance` in W/m² on a surface that faces it.
     pub fn new(direction: DVec3, irradiance: Rgb, scene_radius: f32) -> Result<DirectionalLight, EmitError> {
         let direction = direction.try_normalize().ok_or(EmitError::Transform("directional light"))?;
         let radius = super::environment::disk_radius(scene_radius);

@@ -28,7 +28,8 @@ impl Environment {
         }
     }
 
-    /// Draws a direction roughly in proportion to radiance, with its density per steradian; `None` if there is no light there.
+    /// Draws a direction roughly in proportion to radiance, with its density per steradian; `None` if there is no light
+    /// there.
     pub fn sample(&self, u: [f32; 2]) -> Option<(Vec3, SolidAnglePdf)> {
         match self {
             Environment::Constant(_) => Some((square_to_sphere(u), SolidAnglePdf(SPHERE_PDF))),
@@ -64,8 +65,8 @@ impl Environment {
     }
 }
 
-/// Radius of the disk that emission rays of lights at infinity start on: that of the scene, and a little more so that rounding
-/// leaves no rim unlit; positive even for an empty scene.
+/// Radius of the disk that emission rays of lights at infinity start on: that of the scene, and a little more so that
+/// rounding leaves no rim unlit; positive even for an empty scene.
 pub(super) fn disk_radius(scene_radius: f32) -> f32 {
     if scene_radius.is_finite() && scene_radius > 0.0 { scene_radius * 1.0001 } else { 1.0 }
 }

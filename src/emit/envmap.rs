@@ -1,10 +1,10 @@
 //! A latitude–longitude picture as environment, with Mitsuba 3's conventions.
 //!
-//! In light space +y is up. Column x + ½ of W lies at u = atan2(d.x, −d.z) / 2π (mod 1), so u = 0 looks along −z and u = ¼ along +x;
-//! row y of H lies at θ = π y / (H − 1) from +y: the first and last rows are the poles. Radiance is interpolated bilinearly.
-//! Directions are drawn from a bilinear density over the same grid: luminance times the mean of sin θ around the row, which is
-//! positive at the poles too, so that no lit direction is without density. A texel holds its radiance and its density side by side:
-//! both come from one look-up.
+//! In light space +y is up. Column x + ½ of W lies at u = atan2(d.x, −d.z) / 2π (mod 1), so u = 0 looks along −z and u
+//! = ¼ along +x; row y of H lies at θ = π y / (H − 1) from +y: the first and last rows are the poles. Radiance is
+//! interpolated bilinearly. Directions are drawn from a bilinear density over the same grid: luminance times the mean
+//! of sin θ around the row, which is positive at the poles too, so that no lit direction is without density. A texel
+//! holds its radiance and its density side by side: both come from one look-up.
 
 use super::EmitError;
 use super::orientation::Orientation;
@@ -27,11 +27,13 @@ pub struct EnvMap {
     cells: Option<CellGrid>,
 }
 
-/// sin θ is kept from zero: at the very pole the density per steradian is finite, and the same for sampling and evaluation.
+/// sin θ is kept from zero: at the very pole the density per steradian is finite, and the same for sampling and
+/// evaluation.
 const MIN_SIN: f32 = 1e-6;
 
 impl EnvMap {
-    /// From a picture, a factor, and the transform light → world (its rotation counts). Texels that are negative or not finite are black.
+    /// From a picture, a factor, and the transform light → world (its rotation counts). Texels that are negative or not
+    /// finite are black.
     pub fn new(image: &Image, scale: f32, to_world: DMat4) -> Result<EnvMap, EmitError> {
         let orientation = Orientation::new(to_world).ok_or(EmitError::Transform("environment map"))?;
         let pixels = f64::from(image.width) * f64::from(image.height);
@@ -60,7 +62,8 @@ impl EnvMap {
         Ok(EnvMap { width, height, texels, orientation, cells })
     }
 
-    /// Position of a light-space direction on the grid: u from the first column's centre, v from the upper pole, both in [0, 1].
+    /// Position of a light-space direction on the grid: u from the first column's centre, v from the upper pole, both
+    /// in [0, 1].
     fn direction_to_grid(&self, d: Vec3) -> ([f32; 2], f32) {
         let u = atan2(d.x, -d.z) / TAU - 0.5 / self.width as f32;
         let sin = (d.x * d.x + d.z * d.z).sqrt();

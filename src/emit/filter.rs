@@ -1,5 +1,5 @@
-//! Pixel filters by importance sampling (Ernst et al. 2006): a film sample is drawn around the pixel's centre with density ∝ |f| and
-//! weighted by the sign of f. Definitions and radii are Mitsuba 3's.
+//! Pixel filters by importance sampling (Ernst et al. 2006): a film sample is drawn around the pixel's centre with
+//! density ∝ |f| and weighted by the sign of f. Definitions and radii are Mitsuba 3's.
 
 use crate::math::piecewise::PiecewiseLinear;
 use crate::scene::FilterDesc;
@@ -18,8 +18,8 @@ enum Kind {
     Tabulated(Box<Table>),
 }
 
-/// A filter as a table: what lies between its nodes is interpolated, for samples and splats alike, so that exponentials are computed
-/// once and for all. Of a Gaussian this is off by no more than 4e-5 of its peak.
+/// A filter as a table: what lies between its nodes is interpolated, for samples and splats alike, so that exponentials
+/// are computed once and for all. Of a Gaussian this is off by no more than 4e-5 of its peak.
 #[derive(Clone, Debug)]
 struct Table {
     /// f at equidistant nodes from −radius to radius, per pixel: its integral is 1.
@@ -101,8 +101,9 @@ impl PixelFilter {
         }
     }
 
-    /// One of the pixels whose filter reaches the raster position `at`, and the weight of a splat that goes there instead of
-    /// to all of them: along each axis a pixel is drawn in proportion to |f| at its centre's distance. `None` where no filter reaches.
+    /// One of the pixels whose filter reaches the raster position `at`, and the weight of a splat that goes there
+    /// instead of to all of them: along each axis a pixel is drawn in proportion to |f| at its centre's distance.
+    /// `None` where no filter reaches.
     pub fn splat(&self, at: [f32; 2], u: [f32; 2]) -> Option<([i64; 2], f32)> {
         let (x, wx) = self.splat_axis(at[0], u[0])?;
         let (y, wy) = self.splat_axis(at[1], u[1])?;
@@ -199,7 +200,8 @@ mod tests {
         FilterDesc::Mitchell { b: 0.0, c: 0.75 },
     ];
 
-    /// Mitsuba 3.9.1, scalar_rgb, `rfilter.eval` (relative to the value at zero; its exponential is an approximation to 1e-3).
+    /// Mitsuba 3.9.1, scalar_rgb, `rfilter.eval` (relative to the value at zero; its exponential is an approximation to
+    /// 1e-3).
     #[test]
     fn values_are_mitsubas() {
         let cases = [
@@ -248,8 +250,8 @@ mod tests {
         }
     }
 
-    /// Splats from a regular grid of positions bring every pixel the integral of its filter, 1, and no other mean position than its
-    /// centre.
+    /// Splats from a regular grid of positions bring every pixel the integral of its filter, 1, and no other mean
+    /// position than its centre.
     #[test]
     fn splats_reproduce_the_filter() {
         for desc in ALL {

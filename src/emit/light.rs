@@ -24,8 +24,8 @@ pub enum Light {
 }
 
 impl Light {
-    /// Samples the light as seen from `from`; `None` if no light can arrive from the sample. The density is for the light alone:
-    /// multiply by the probability of having chosen it.
+    /// Samples the light as seen from `from`; `None` if no light can arrive from the sample. The density is for the
+    /// light alone: multiply by the probability of having chosen it.
     #[inline]
     pub fn sample_direct(&self, from: Vec3, u: [f32; 2]) -> Option<DirectSample> {
         match self {
@@ -37,8 +37,8 @@ impl Light {
         }
     }
 
-    /// Density per steradian with which [`Light::sample_direct`] draws the unit direction `wi`, along which a ray from `from`
-    /// meets the light after `distance` (infinite for lights at infinity). Zero for delta lights.
+    /// Density per steradian with which [`Light::sample_direct`] draws the unit direction `wi`, along which a ray from
+    /// `from` meets the light after `distance` (infinite for lights at infinity). Zero for delta lights.
     #[inline]
     pub fn pdf_direct(&self, from: Vec3, wi: Vec3, distance: f32) -> SolidAnglePdf {
         match self {
@@ -48,8 +48,8 @@ impl Light {
         }
     }
 
-    /// Radiance that leaves the light in the unit direction `wo`; `b` = barycentrics (b1, b2) of the point on a triangle, unused
-    /// by other kinds. Black for delta lights: no ray meets them.
+    /// Radiance that leaves the light in the unit direction `wo`; `b` = barycentrics (b1, b2) of the point on a
+    /// triangle, unused by other kinds. Black for delta lights: no ray meets them.
     #[inline]
     pub fn emitted(&self, b: [f32; 2], wo: Vec3) -> Rgb {
         match self {
@@ -70,9 +70,9 @@ impl Light {
         }
     }
 
-    /// Densities with which [`Light::sample_emission`] draws a ray in the unit direction `wo`: of its origin (per unit area, any
-    /// point of the light or of the disk) and of its direction (per steradian). A delta factor is zero: no ray found in another
-    /// way has that exact position or direction.
+    /// Densities with which [`Light::sample_emission`] draws a ray in the unit direction `wo`: of its origin (per unit
+    /// area, any point of the light or of the disk) and of its direction (per steradian). A delta factor is zero: no
+    /// ray found in another way has that exact position or direction.
     pub fn pdf_emission(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
         match self {
             Light::Triangle(l) => l.pdf_emission(wo),
@@ -83,8 +83,9 @@ impl Light {
         }
     }
 
-    /// Densities of the emission ray in the direction `wo` from a vertex that is on the light by construction, as those of
-    /// [`Light::sample_direct`] are: [`Light::pdf_emission`] with delta factors counted as 1, as MIS weights need them.
+    /// Densities of the emission ray in the direction `wo` from a vertex that is on the light by construction, as those
+    /// of [`Light::sample_direct`] are: [`Light::pdf_emission`] with delta factors counted as 1, as MIS weights need
+    /// them.
     pub fn pdf_emission_at_vertex(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
         match self {
             Light::Point(l) => (AreaPdf(1.0), l.pdf_direction()),
@@ -94,8 +95,9 @@ impl Light {
         }
     }
 
-    /// [`Light::pdf_emission_at_vertex`] of the ray that runs back along `sample`, a result of [`Light::sample_direct`]. Of an
-    /// environment the density of the direction is taken from the sample, which saves a look-up in the environment map.
+    /// [`Light::pdf_emission_at_vertex`] of the ray that runs back along `sample`, a result of
+    /// [`Light::sample_direct`]. Of an environment the density of the direction is taken from the sample, which saves a
+    /// look-up in the environment map.
     #[inline]
     pub fn pdf_emission_at_sample(&self, sample: &DirectSample) -> (AreaPdf, SolidAnglePdf) {
         match self {
@@ -104,7 +106,8 @@ impl Light {
         }
     }
 
-    /// Luminance of the emitted flux: the weight of the light when one is sampled by power. Positive wherever light is emitted.
+    /// Luminance of the emitted flux: the weight of the light when one is sampled by power. Positive wherever light is
+    /// emitted.
     pub fn power(&self) -> f32 {
         match self {
             Light::Triangle(l) => l.power(),
@@ -153,8 +156,8 @@ impl Light {
         matches!(self, Light::Directional(_))
     }
 
-    /// The light vertex of a ray that met the light at `p` (any value for lights at infinity); `error` bounds the rounding error of any
-    /// component of `p`.
+    /// The light vertex of a ray that met the light at `p` (any value for lights at infinity); `error` bounds the
+    /// rounding error of any component of `p`.
     pub fn end_at(&self, p: Vec3, error: f32) -> EmitterVertex {
         match self {
             Light::Triangle(l) => EmitterVertex::Surface { p, error, ng: l.ng() },

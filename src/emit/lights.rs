@@ -1,8 +1,8 @@
 //! All lights of a scene, and the sampling of one.
 //!
-//! Light sub-paths sample a light in proportion to power. Direct light samples one for the point that is lit: lights with a position by a
-//! [`WideLightTree`] unless they are few, lights at infinity with a probability of their own, since their power (it
-//! grows with the scene's size) does not tell how much arrives at a point.
+//! Light sub-paths sample a light in proportion to power. Direct light samples one for the point that is lit: lights
+//! with a position by a [`WideLightTree`] unless they are few, lights at infinity with a probability of their own,
+//! since their power (it grows with the scene's size) does not tell how much arrives at a point.
 
 use super::light::Light;
 use crate::math::cdf::PrefixSums;
@@ -42,7 +42,8 @@ struct Direct {
     infinite: PrefixSums,
 }
 
-/// Fewest lights with a position for which a tree is built if no light is at infinity; fewer are sampled by power alone.
+/// Fewest lights with a position for which a tree is built if no light is at infinity; fewer are sampled by power
+/// alone.
 const LIGHT_TREE_MIN: usize = 5;
 
 impl Direct {
@@ -142,10 +143,12 @@ impl LightSet {
         self.direct.is_some()
     }
 
-    /// Samples a light that may light the point `p`, for direct light. `n` is the unit geometric normal on the side where light is
-    /// received; sets of lights wholly below its horizon have no probability. `None` if light is received from both sides, or in a volume.
+    /// Samples a light that may light the point `p`, for direct light. `n` is the unit geometric normal on the side
+    /// where light is received; sets of lights wholly below its horizon have no probability. `None` if light is
+    /// received from both sides, or in a volume.
     ///
-    /// The probability is exactly [`LightSet::pmf_light_from`] with the same `p` and `n`. `None` is returned only if no light has power.
+    /// The probability is exactly [`LightSet::pmf_light_from`] with the same `p` and `n`. `None` is returned only if no
+    /// light has power.
     #[inline]
     pub fn sample_light_from(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(LightId, Pmf)> {
         match &self.direct {

@@ -2,8 +2,9 @@
 //!
 //! Every light can be sampled in both directions: a point (or direction) of the light as seen from a reference point
 //! ([`Light::sample_direct`]) and a whole ray that leaves it ([`Light::sample_emission`]); so can the camera
-//! ([`Camera::sample_ray`], [`Camera::sample_lens`]). Each sampling function has a density function that agrees with it.
-//! Positions are single precision, relative to the scene's centre; constructors take the description in double precision.
+//! ([`Camera::sample_ray`], [`Camera::sample_lens`]). Each sampling function has a density function that agrees with
+//! it. Positions are single precision, relative to the scene's centre; constructors take the description in double
+//! precision.
 
 pub mod camera;
 pub mod delta;

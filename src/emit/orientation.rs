@@ -11,7 +11,8 @@ pub(super) struct Orientation {
 }
 
 impl Orientation {
-    /// The axes of `to_world` without scale and shear: z is kept, y made perpendicular, x's side is kept. `None` if they are degenerate.
+    /// The axes of `to_world` without scale and shear: z is kept, y made perpendicular, x's side is kept. `None` if
+    /// they are degenerate.
     pub fn new(to_world: DMat4) -> Option<Orientation> {
         let z = to_world.z_axis.truncate().try_normalize()?;
         let y = to_world.y_axis.truncate();

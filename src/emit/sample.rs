@@ -1,9 +1,9 @@
 //! Samples of lights, and the conventions for lights at infinity.
 //!
-//! A light at infinity has no points. By convention its path vertex y_0 carries a direction; the vertex's "area density" is the
-//! density per steradian of that direction, its geometry term with the next vertex has neither 1/d² nor a cosine at the light,
-//! and the next vertex's area density comes from the disk that emission rays start on. The functions of [`EmitterVertex`] apply
-//! these rules, so that callers write one formula for all lights.
+//! A light at infinity has no points. By convention its path vertex y_0 carries a direction; the vertex's "area
+//! density" is the density per steradian of that direction, its geometry term with the next vertex has neither 1/d² nor
+//! a cosine at the light, and the next vertex's area density comes from the disk that emission rays start on. The
+//! functions of [`EmitterVertex`] apply these rules, so that callers write one formula for all lights.
 
 use crate::math::measure::area_jacobian;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
@@ -39,8 +39,8 @@ impl EmitterVertex {
         }
     }
 
-    /// Density of the emission's direction given the light vertex, per steradian; of a light at infinity, the density of the ray's origin
-    /// on the disk, per unit area.
+    /// Density of the emission's direction given the light vertex, per steradian; of a light at infinity, the density
+    /// of the ray's origin on the disk, per unit area.
     pub fn pdf_emission_dir(&self, position: AreaPdf, direction: SolidAnglePdf) -> SolidAnglePdf {
         match self {
             EmitterVertex::Infinite => SolidAnglePdf(position.0),
@@ -48,8 +48,8 @@ impl EmitterVertex {
         }
     }
 
-    /// Area density of the vertex that follows the light vertex on an emission ray; `cos_next` is the cosine at that vertex
-    /// between its normal and the segment, `dist2` the segment's squared length (unused at infinity).
+    /// Area density of the vertex that follows the light vertex on an emission ray; `cos_next` is the cosine at that
+    /// vertex between its normal and the segment, `dist2` the segment's squared length (unused at infinity).
     pub fn pdf_next_vertex(&self, position: AreaPdf, direction: SolidAnglePdf, cos_next: f32, dist2: f32) -> AreaPdf {
         match self {
             // The disk is perpendicular to the ray: only the cosine at the receiver remains.
@@ -59,8 +59,8 @@ impl EmitterVertex {
     }
 
     /// Factor from a density per steradian at the next vertex to a density of the light vertex, in the measure of
-    /// [`EmitterVertex::pdf_vertex`]. `wo` is the unit direction of the segment, either way, and `dist2` its squared length. The factor of
-    /// a light without extent is 1.
+    /// [`EmitterVertex::pdf_vertex`]. `wo` is the unit direction of the segment, either way, and `dist2` its squared
+    /// length. The factor of a light without extent is 1.
     #[inline]
     pub fn area_jacobian(&self, wo: Vec3, dist2: f32) -> f32 {
         match self {
@@ -79,9 +79,9 @@ impl EmitterVertex {
         }
     }
 
-    /// Throughput of a light sub-path after its first edge. The sub-path leaves this vertex in the unit direction `direction`; `pdf` is the
-    /// joint density of vertex and direction. `radiance` arrives along the edge, whose length is `distance` (of a point light: intensity /
-    /// distance²).
+    /// Throughput of a light sub-path after its first edge. The sub-path leaves this vertex in the unit direction
+    /// `direction`; `pdf` is the joint density of vertex and direction. `radiance` arrives along the edge, whose length
+    /// is `distance` (of a point light: intensity / distance²).
     #[inline]
     pub fn flux(&self, radiance: Rgb, direction: Vec3, distance: f32, pdf: f32) -> Rgb {
         let factor = match self {
@@ -102,8 +102,9 @@ pub struct DirectSample {
     pub distance: f32,
     /// The segment's end at the light.
     pub end: EmitterVertex,
-    /// Emitted radiance towards the reference point. Of a point or spot light: intensity / distance². Of a directional light:
-    /// irradiance on a surface that faces it. In all cases `radiance / pdf` times BSDF and cosine estimates reflected radiance.
+    /// Emitted radiance towards the reference point. Of a point or spot light: intensity / distance². Of a directional
+    /// light: irradiance on a surface that faces it. In all cases `radiance / pdf` times BSDF and cosine estimates
+    /// reflected radiance.
     pub radiance: Rgb,
     /// Density per steradian at the reference point; 1 for delta lights. The choice of the light is not part of it.
     pub pdf: SolidAnglePdf,
@@ -124,8 +125,8 @@ pub struct EmissionSample {
     pub direction: Vec3,
     /// Emitted radiance; of a point or spot light its intensity, of a directional light its irradiance.
     pub radiance: Rgb,
-    /// Density of `origin` per unit area: of the surface, or of the disk perpendicular to `direction` for lights at infinity; 1 for
-    /// a light at a point.
+    /// Density of `origin` per unit area: of the surface, or of the disk perpendicular to `direction` for lights at
+    /// infinity; 1 for a light at a point.
     pub pdf_position: AreaPdf,
     /// Density of `direction` per steradian; 1 for a directional light.
     pub pdf_direction: SolidAnglePdf,

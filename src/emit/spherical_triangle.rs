@@ -1,7 +1,8 @@
 //! Triangles seen from a point: solid angle and uniform sampling of it.
 //!
-//! Arvo 1995, "Stratified Sampling of Spherical Triangles"; the solid angle by Van Oosterom & Strackee 1983, which keeps its precision
-//! for small triangles. All in double precision: Arvo's formulas subtract angles that sum to nearly π.
+//! Arvo 1995, "Stratified Sampling of Spherical Triangles"; the solid angle by Van Oosterom & Strackee 1983, which
+//! keeps its precision for small triangles. All in double precision: Arvo's formulas subtract angles that sum to nearly
+//! π.
 
 use crate::math::trig::atan2;
 use crate::math::{DVec3, Vec3};
@@ -52,7 +53,8 @@ impl SphericalTriangle {
             return None;
         }
         let cos_side = a.dot(b);
-        // The third corner moves along the side a–c until the area is the wanted part; s and t are sine and cosine of that area − α.
+        // The third corner moves along the side a–c until the area is the wanted part; s and t are sine and cosine of
+        // that area − α.
         let (sin, cos) = (u[0] * self.solid_angle).sin_cos();
         let (s, t) = (sin * cos_alpha - cos * sin_alpha, cos * cos_alpha + sin * sin_alpha);
         let p = t - cos_alpha;
@@ -71,7 +73,8 @@ impl SphericalTriangle {
         Some(b * z + away * reach)
     }
 
-    /// Barycentrics (b1, b2) of the point of the triangle in the direction `d`, pulled onto the triangle where rounding left it.
+    /// Barycentrics (b1, b2) of the point of the triangle in the direction `d`, pulled onto the triangle where rounding
+    /// left it.
     #[inline]
     pub fn barycentrics(&self, d: DVec3) -> [f32; 2] {
         let volume: [f64; 3] = std::array::from_fn(|i| d.dot(self.sides[i]) * self.inverse_lengths[i]);

@@ -1,8 +1,9 @@
 //! Radiance of the sun's disk, tabulated.
 //!
-//! Hosek & Wilkie 2013 ("Adding a Solar-Radiance Function to the Hošek-Wilkie Skylight Model"), averaged over the disk and in linear
-//! Rec. 709: values recorded from Mitsuba 3.9.1 (`sunsky`, scalar_rgb, `sky_scale` 0, aperture 0.5358°), which interpolates
-//! linearly between these nodes. Its small negative blues (out of gamut, sun below 3°) are kept here and clamped after interpolation.
+//! Hosek & Wilkie 2013 ("Adding a Solar-Radiance Function to the Hošek-Wilkie Skylight Model"), averaged over the disk
+//! and in linear Rec. 709: values recorded from Mitsuba 3.9.1 (`sunsky`, scalar_rgb, `sky_scale` 0, aperture 0.5358°),
+//! which interpolates linearly between these nodes. Its small negative blues (out of gamut, sun below 3°) are kept here
+//! and clamped after interpolation.
 
 /// Elevation in degrees of the first node.
 pub const FIRST: f32 = 2.0;

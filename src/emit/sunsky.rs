@@ -1,9 +1,9 @@
 //! Clear sky and sun.
 //!
-//! The sky is Hosek & Wilkie 2012, "An Analytic Model for Full Spectral Sky-Dome Radiance", eqs. 8 – 9, in its RGB variant,
-//! evaluated exactly for every direction of the upper hemisphere; below the horizon it is black, as in Mitsuba 3's `sunsky`. Its
-//! directions are drawn from a bilinear density over (azimuth, zenith angle). The sun is a cone of uniform radiance; seen
-//! under another angle than the real one it gives the same irradiance.
+//! The sky is Hosek & Wilkie 2012, "An Analytic Model for Full Spectral Sky-Dome Radiance", eqs. 8 – 9, in its RGB
+//! variant, evaluated exactly for every direction of the upper hemisphere; below the horizon it is black, as in Mitsuba
+//! 3's `sunsky`. Its directions are drawn from a bilinear density over (azimuth, zenith angle). The sun is a cone of
+//! uniform radiance; seen under another angle than the real one it gives the same irradiance.
 
 use super::orientation::Orientation;
 use super::sun_table::{FIRST, NODES, RADIANCE, STEP};
@@ -22,7 +22,8 @@ const REAL_APERTURE: f32 = 0.5358;
 const GRID: [usize; 2] = [256, 96];
 /// Every sky direction keeps this part of the mean density.
 const FLOOR: f32 = 1e-3;
-/// The sun's share of samples is its share of the flux, but no more than this: where the sun does not shine only the sky counts.
+/// The sun's share of samples is its share of the flux, but no more than this: where the sun does not shine only the
+/// sky counts.
 const MAX_SUN_SHARE: f32 = 0.75;
 /// See `envmap`.
 const MIN_SIN: f32 = 1e-6;

@@ -1,7 +1,8 @@
 //! An emitting triangle.
 //!
-//! As seen from a reference point it is sampled uniformly in solid angle when it is large (see `SPHERICAL_FROM`), and uniformly in
-//! area when it is small and the two hardly differ. Which of them is a function of the point and the triangle alone.
+//! As seen from a reference point it is sampled uniformly in solid angle when it is large (see `SPHERICAL_FROM`), and
+//! uniformly in area when it is small and the two hardly differ. Which of them is a function of the point and the
+//! triangle alone.
 
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::spherical_triangle::SphericalTriangle;
@@ -53,21 +54,22 @@ pub struct TriangleLight {
 
 /// Points per edge of the grid on which a textured triangle's mean radiance is taken.
 const POWER_GRID: u32 = 8;
-/// Part of its texture's mean that a textured triangle is credited with at least: the grid may miss its bright texels, but the
-/// triangle must keep a probability.
+/// Part of its texture's mean that a textured triangle is credited with at least: the grid may miss its bright texels,
+/// but the triangle must keep a probability.
 const POWER_FLOOR: f32 = 0.01;
 
-/// Area over squared distance to the nearest point (the solid angle of a facing triangle) from which on a triangle is sampled by solid
-/// angle. Sampling by area leaves the variation of cos/d² over the triangle in the estimate, which near this size is little beside what
-/// the BSDF and visibility leave: in rooms, values of 0.3 and 1 gave the same variance of the picture. A sample by solid angle costs as
-/// much as several rays, so only triangles that fill much of the view get one.
+/// Area over squared distance to the nearest point (the solid angle of a facing triangle) from which on a triangle is
+/// sampled by solid angle. Sampling by area leaves the variation of cos/d² over the triangle in the estimate, which
+/// near this size is little beside what the BSDF and visibility leave: in rooms, values of 0.3 and 1 gave the same
+/// variance of the picture. A sample by solid angle costs as much as several rays, so only triangles that fill much of
+/// the view get one.
 const SPHERICAL_FROM: f32 = 1.0;
 /// Below this solid angle (seen edge-on) the spherical triangle is too thin to be sampled with precision.
 const MIN_SOLID_ANGLE: f64 = 1e-6;
 
 impl TriangleLight {
-    /// From corners in counter-clockwise order as seen from the emitting side; `flip` makes the other side emit. A triangle
-    /// without area never emits.
+    /// From corners in counter-clockwise order as seen from the emitting side; `flip` makes the other side emit. A
+    /// triangle without area never emits.
     pub fn new(v: [Vec3; 3], flip: bool, emission: TriangleEmission) -> TriangleLight {
         let d = |i: usize| v[i].as_dvec3();
         let cross = (d(1) - d(0)).cross(d(2) - d(0)) * if flip { -1.0 } else { 1.0 };
@@ -138,7 +140,8 @@ impl TriangleLight {
         if self.ng.dot(wo) > 0.0 { self.radiance(b) } else { Rgb::BLACK }
     }
 
-    /// The point at the barycentrics (b1, b2), and the bound on the error of its components (as `ray::offset` has it for hits).
+    /// The point at the barycentrics (b1, b2), and the bound on the error of its components (as `ray::offset` has it
+    /// for hits).
     #[inline]
     fn point(&self, b: [f32; 2]) -> (Vec3, f32) {
         let terms = [self.v[0] * (1.0 - b[0] - b[1]), self.v[1] * b[0], self.v[2] * b[1]];

@@ -1,14 +1,14 @@
-//! Discrete distributions as cumulative sums: [`CdfRows`] for fast look-ups in many distributions over equally many choices,
-//! [`PrefixSums`] for distributions over any sub-range of a list of weights.
+//! Discrete distributions as cumulative sums: [`CdfRows`] for fast look-ups in many distributions over equally many
+//! choices, [`PrefixSums`] for distributions over any sub-range of a list of weights.
 
 use std::ops::Range;
 
-/// Normalised cumulative sums of many discrete distributions (rows) over the same number of cells. A guide table stores, for equal parts
-/// of the unit interval, the cell where a search begins, so that a look-up touches one cache line of the guide and, mostly, one of
-/// the sums (Chen and Asau 1974).
+/// Normalised cumulative sums of many discrete distributions (rows) over the same number of cells. A guide table
+/// stores, for equal parts of the unit interval, the cell where a search begins, so that a look-up touches one cache
+/// line of the guide and, mostly, one of the sums (Chen and Asau 1974).
 ///
-/// Sums are single precision: their rounding moves the border between two cells by at most as much as the spacing of the random
-/// numbers.
+/// Sums are single precision: their rounding moves the border between two cells by at most as much as the spacing of
+/// the random numbers.
 #[derive(Clone, Debug, Default)]
 pub struct CdfRows {
     cells: usize,
@@ -45,7 +45,8 @@ impl CdfRows {
         self.totals.reserve(rows);
     }
 
-    /// Appends a row whose cell `i` has the mass `mass(i)` ≥ 0 and returns the sum of its masses. A row without mass is uniform.
+    /// Appends a row whose cell `i` has the mass `mass(i)` ≥ 0 and returns the sum of its masses. A row without mass is
+    /// uniform.
     pub fn push(&mut self, mass: impl Fn(usize) -> f64) -> f64 {
         let total: f64 = (0..self.cells).map(&mass).sum();
         let start = self.cdf.len();
@@ -86,8 +87,8 @@ impl CdfRows {
         self.totals[row]
     }
 
-    /// The cell of `row` that holds `u` in [0, 1), and the relative position of `u` inside the cell. A cell without mass is never found in
-    /// a row with mass.
+    /// The cell of `row` that holds `u` in [0, 1), and the relative position of `u` inside the cell. A cell without
+    /// mass is never found in a row with mass.
     #[inline]
     pub fn find(&self, row: usize, u: f32) -> (usize, f32) {
         let guide = &self.guide[row * (self.parts + 1)..][..self.parts + 1];
@@ -115,8 +116,8 @@ impl CdfRows {
     }
 }
 
-/// Sums of the weights before each item of a list: the weight of any range in constant time, and draws from any range in proportion to
-/// weight. Double precision, not normalised.
+/// Sums of the weights before each item of a list: the weight of any range in constant time, and draws from any range
+/// in proportion to weight. Double precision, not normalised.
 #[derive(Clone, Debug, Default)]
 pub struct PrefixSums {
     /// The sum of the weights before each item, and of all; empty if nothing was ever summed.
@@ -170,7 +171,8 @@ impl PrefixSums {
         if total > 0.0 { (self.sums[item + 1] - self.sums[item]) / total } else { 0.0 }
     }
 
-    /// Draws an item of `range` in proportion to weight with the random number `u` in [0, 1); `None` if the range has no weight.
+    /// Draws an item of `range` in proportion to weight with the random number `u` in [0, 1); `None` if the range has
+    /// no weight.
     #[inline]
     pub fn sample(&self, range: &Range<usize>, u: f64) -> Option<usize> {
         let total = self.weight(range);
@@ -186,8 +188,8 @@ impl PrefixSums {
         Some(item)
     }
 
-    /// The last item of `range` whose prefix sum is at most `target`. The search gallops from the place where the item is if all weights
-    /// are equal: those of the triangles of one tessellated emitter often are.
+    /// The last item of `range` whose prefix sum is at most `target`. The search gallops from the place where the item
+    /// is if all weights are equal: those of the triangles of one tessellated emitter often are.
     #[inline]
     fn search(&self, &Range { start, end }: &Range<usize>, target: f64, u: f64) -> usize {
         let guess = (start + (u * (end - start) as f64) as usize).min(end - 1);

@@ -4,8 +4,9 @@ use super::measure::Pmf;
 
 /// Constant-time choice with given probabilities (Walker 1974; built by Vose's method, 1991).
 ///
-/// One random number serves for both the column and the coin. A float has 24 random bits, so with n entries a probability is
-/// met to about n·2^-24: good to four digits up to a thousand entries, to one percent up to some hundred thousand.
+/// One random number serves for both the column and the coin. A float has 24 random bits, so with n entries a
+/// probability is met to about n·2^-24: good to four digits up to a thousand entries, to one percent up to some hundred
+/// thousand.
 #[derive(Clone, Debug, Default)]
 pub struct AliasTable {
     columns: Vec<Column>,

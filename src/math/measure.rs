@@ -1,14 +1,16 @@
-//! Densities that carry their measure in the type, so that adding a solid-angle density to an area density does not compile.
+//! Densities that carry their measure in the type, so that adding a solid-angle density to an area density does not
+//! compile.
 //!
-//! The only conversions are [`SolidAnglePdf::to_area`] and [`AreaPdf::to_solid_angle`], and [`area_jacobian`] where one factor serves several
-//! densities (Veach 1997, eq. 8.8: p_A(x') = p_σ(ω) |cos θ'| / d²).
+//! The only conversions are [`SolidAnglePdf::to_area`] and [`AreaPdf::to_solid_angle`], and [`area_jacobian`] where one
+//! factor serves several densities (Veach 1997, eq. 8.8: p_A(x') = p_σ(ω) |cos θ'| / d²).
 
 /// Density per steradian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 #[repr(transparent)]
 pub struct SolidAnglePdf(pub f32);
 
-/// Density per unit area of a surface. For a vertex at infinity it is, by convention, the density per steradian of its direction.
+/// Density per unit area of a surface. For a vertex at infinity it is, by convention, the density per steradian of its
+/// direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 #[repr(transparent)]
 pub struct AreaPdf(pub f32);
@@ -18,8 +20,8 @@ pub struct AreaPdf(pub f32);
 #[repr(transparent)]
 pub struct Pmf(pub f32);
 
-/// dσ/dA = |cos θ'| / d²: the factor from a density per steradian to one per unit area at the far point, whose normal makes `cos` with
-/// the direction; `dist2` is the squared distance in scene units.
+/// dσ/dA = |cos θ'| / d²: the factor from a density per steradian to one per unit area at the far point, whose normal
+/// makes `cos` with the direction; `dist2` is the squared distance in scene units.
 #[inline]
 pub fn area_jacobian(cos: f32, dist2: f32) -> f32 {
     cos.abs() / dist2

@@ -1,5 +1,6 @@
-//! Continuous distributions over the unit interval and square whose density is interpolated linearly between nodes: exact
-//! sampling, density and inverse. Unlike piecewise constant ones they are positive wherever an interpolated picture is.
+//! Continuous distributions over the unit interval and square whose density is interpolated linearly between nodes:
+//! exact sampling, density and inverse. Unlike piecewise constant ones they are positive wherever an interpolated
+//! picture is.
 
 use super::cdf::CdfRows;
 use super::float::ONE_MINUS_EPSILON;
@@ -47,14 +48,15 @@ pub struct PiecewiseLinear {
     values: Vec<f64>,
     /// Mass below each node.
     cdf: Vec<f64>,
-    /// For as many equal parts of the unit interval as there are cells, the last cell that begins at or below the part's start.
+    /// For as many equal parts of the unit interval as there are cells, the last cell that begins at or below the
+    /// part's start.
     guide: Vec<u32>,
     integral: f64,
 }
 
 impl PiecewiseLinear {
-    /// Through `values` at equidistant nodes, the first at 0 and the last at 1. Negative, NaN and infinite values count as zero.
-    /// `None` for fewer than two nodes or no mass.
+    /// Through `values` at equidistant nodes, the first at 0 and the last at 1. Negative, NaN and infinite values count
+    /// as zero. `None` for fewer than two nodes or no mass.
     pub fn new(values: &[f32]) -> Option<PiecewiseLinear> {
         PiecewiseLinear::from_f64(values.iter().map(|&v| clean(v)).collect())
     }
@@ -115,7 +117,8 @@ impl PiecewiseLinear {
     }
 }
 
-/// The cell i of `cells` with cdf(i) ≤ target < cdf(i + 1), a cell with mass even if rounding puts the target beyond the last.
+/// The cell i of `cells` with cdf(i) ≤ target < cdf(i + 1), a cell with mass even if rounding puts the target beyond
+/// the last.
 fn find_cell(cells: Range<usize>, target: f64, cdf: impl Fn(usize) -> f64) -> usize {
     let (mut low, mut high) = (cells.start, cells.end);
     while high - low > 1 {
@@ -128,8 +131,8 @@ fn find_cell(cells: Range<usize>, target: f64, cdf: impl Fn(usize) -> f64) -> us
     low
 }
 
-/// Choice of a cell of a regular grid over the unit square: first its row, then its place in the row. Every cell gets a rectangle
-/// of the random numbers, so that stratified numbers give stratified cells.
+/// Choice of a cell of a regular grid over the unit square: first its row, then its place in the row. Every cell gets a
+/// rectangle of the random numbers, so that stratified numbers give stratified cells.
 #[derive(Clone, Debug)]
 pub struct CellGrid {
     rows: CdfRows,
@@ -170,7 +173,8 @@ impl CellGrid {
     }
 }
 
-/// A place (s, t) in a cell with density in proportion to the bilinear interpolation of the values `w` at its corners (row by row).
+/// A place (s, t) in a cell with density in proportion to the bilinear interpolation of the values `w` at its corners
+/// (row by row).
 #[inline]
 pub fn sample_in_cell([a, b, c, d]: [f32; 4], xi: [f32; 2]) -> [f32; 2] {
     let t = invert_linear_f32(a + b, c + d, xi[1]);
@@ -189,7 +193,8 @@ fn invert_linear_f32(a: f32, b: f32, r: f32) -> f32 {
     (r / (a + (a * a + r * (b * b - a * a)).max(0.0).sqrt())).min(1.0)
 }
 
-/// A density on the unit square, bilinear between the nodes of a regular grid: a cell is drawn by its mass, then a place inside it.
+/// A density on the unit square, bilinear between the nodes of a regular grid: a cell is drawn by its mass, then a
+/// place inside it.
 #[derive(Clone, Debug)]
 pub struct PiecewiseBilinear {
     /// Values at the nodes, row by row, normalised to integral one.
@@ -200,8 +205,8 @@ pub struct PiecewiseBilinear {
 }
 
 impl PiecewiseBilinear {
-    /// Through `values` at the nodes of a grid with `nodes_u` nodes in a row; the first node is at u = v = 0, the last at 1.
-    /// Negative, NaN and infinite values count as zero. `None` without a cell or without mass.
+    /// Through `values` at the nodes of a grid with `nodes_u` nodes in a row; the first node is at u = v = 0, the last
+    /// at 1. Negative, NaN and infinite values count as zero. `None` without a cell or without mass.
     pub fn new(values: &[f32], nodes_u: usize) -> Option<PiecewiseBilinear> {
         let cells_u = nodes_u.checked_sub(1).filter(|&n| n > 0)?;
         if !values.len().is_multiple_of(nodes_u) {

@@ -1,12 +1,14 @@
 //! Sample values of one path: Owen-scrambled Sobol points on the camera and the first vertices, hashed numbers beyond.
 //!
 //! Each pixel has its own scramble, so pixels are independent and one pixel's samples are stratified over iterations
-//! (Burley 2020, "Practical hash-based Owen scrambling"). Values come four at a time, one set for each [`SampleSlot`] of a vertex.
+//! (Burley 2020, "Practical hash-based Owen scrambling"). Values come four at a time, one set for each [`SampleSlot`]
+//! of a vertex.
 //!
-//! The Sobol matrices and the scramble are those of the crate `sobol_burley`; three things make them cheaper here. The shuffled index
-//! is the same for all dimensions of a path and is computed once. A Sobol point is linear in the bits of its index, so instead
-//! of one direction vector for every set bit it is the sum of one table entry for every four bits, without a branch. And both sets
-//! of a vertex are made together, as arrays of eight that fill a vector register, when the first of them is asked for.
+//! The Sobol matrices and the scramble are those of the crate `sobol_burley`; three things make them cheaper here. The
+//! shuffled index is the same for all dimensions of a path and is computed once. A Sobol point is linear in the bits of
+//! its index, so instead of one direction vector for every set bit it is the sum of one table entry for every four
+//! bits, without a branch. And both sets of a vertex are made together, as arrays of eight that fill a vector register,
+//! when the first of them is asked for.
 
 use super::hash::{HashRng, hash_words, mix64};
 use sobol_burley::parts::{hash, owen_scramble_rev, sobol_rev, u32_to_f32_norm};
@@ -15,7 +17,8 @@ use std::sync::LazyLock;
 /// Sets of four numbers of a vertex. Fixed slots keep Sobol dimensions aligned whatever earlier vertices consumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleSlot {
-    /// Sampling a light and a point on it, and one more number for connections to stored vertices: [light, u, v, connection].
+    /// Sampling a light and a point on it, and one more number for connections to stored vertices: [light, u, v,
+    /// connection].
     Emitter = 0,
     /// Sampling a lobe and a direction, and Russian roulette: [lobe, u, v, roulette].
     Scatter = 1,
@@ -30,7 +33,8 @@ const SEQUENCE_BITS: u32 = 16;
 /// Index bits that one table entry stands for.
 const CHUNK: u32 = 4;
 const CHUNKS: usize = (SEQUENCE_BITS / CHUNK) as usize;
-/// What tells the dimensions of a set apart before they are scrambled (sobol_burley's constants), for both sets of a vertex.
+/// What tells the dimensions of a set apart before they are scrambled (sobol_burley's constants), for both sets of a
+/// vertex.
 const LANE_KEYS: [u32; LANES] = [
     0x912f_69ba,
     0x174f_18ab,
@@ -42,7 +46,8 @@ const LANE_KEYS: [u32; LANES] = [
     0xb40c_c1b8 ^ 1,
 ];
 
-/// `TABLES[vertex][chunk][bits]`: what the index bits of a chunk contribute to the dimensions of a vertex (bit-reversed).
+/// `TABLES[vertex][chunk][bits]`: what the index bits of a chunk contribute to the dimensions of a vertex
+/// (bit-reversed).
 type Tables = [[[[u32; LANES]; 1 << CHUNK]; CHUNKS]; SOBOL_VERTICES as usize + 1];
 
 static TABLES: LazyLock<Box<Tables>> = LazyLock::new(|| {

@@ -1,7 +1,7 @@
 //! Exact Euclidean distance from every cube to the nearest solid one, squared, in cubes between middles.
 //!
-//! One pass along each axis: the squared distance along a line is the lower envelope of parabolas (Felzenszwalb and Huttenlocher
-//! 2012). All numbers are whole, so the result is exact.
+//! One pass along each axis: the squared distance along a line is the lower envelope of parabolas (Felzenszwalb and
+//! Huttenlocher 2012). All numbers are whole, so the result is exact.
 
 use super::voxels::VoxelGrid;
 use rayon::prelude::*;

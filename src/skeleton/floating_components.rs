@@ -1,9 +1,9 @@
-//! Solid components that touch nothing (a hanging lamp, a book a hair above its table) are connected to the walls by bridges: paths of
-//! cubes one cube thick.
+//! Solid components that touch nothing (a hanging lamp, a book a hair above its table) are connected to the walls by
+//! bridges: paths of cubes one cube thick.
 //!
-//! Empty space around a floating component is a shell, and thinning a shell leaves a closed sheet: no curve has its topology. With a
-//! bridge through the shell it has the topology of a room with a pillar. Bridges are cut into the space that is thinned and nowhere
-//! else: neither distances nor the map of nodes contain them.
+//! Empty space around a floating component is a shell, and thinning a shell leaves a closed sheet: no curve has its
+//! topology. With a bridge through the shell it has the topology of a room with a pillar. Bridges are cut into the
+//! space that is thinned and nowhere else: neither distances nor the map of nodes contain them.
 
 use super::simple::{CENTRE, pieces};
 use super::voxels::{OFFSETS, VoxelGrid};
@@ -11,8 +11,8 @@ use std::collections::VecDeque;
 
 const NO_CUBE: usize = usize::MAX;
 
-/// The empty cubes, less bridges from floating components to the rim or to components connected to it. A bridge that would split empty
-/// space is left out. `squared` are the squared distances to solid cubes, in cubes.
+/// The empty cubes, less bridges from floating components to the rim or to components connected to it. A bridge that
+/// would split empty space is left out. `squared` are the squared distances to solid cubes, in cubes.
 pub fn bridge(grid: &VoxelGrid, squared: &[u32]) -> Vec<bool> {
     let mut object: Vec<bool> = squared.iter().map(|&d| d > 0).collect();
     if object.is_empty() {

@@ -1,12 +1,14 @@
 //! From cubes on curves to few nodes: each node clears its maximal ball of smaller ones (Noël and Biri 2015, §4.4).
 //!
-//! A ball is empty space, and its middle sees all of it: one node speaks for what is inside. What a node of the curves becomes when it is
-//! removed is the nearest node that stays, along the curves; so the graph of those that stay hangs together where the curves do.
+//! A ball is empty space, and its middle sees all of it: one node speaks for what is inside. What a node of the curves
+//! becomes when it is removed is the nearest node that stays, along the curves; so the graph of those that stay hangs
+//! together where the curves do.
 //!
-//! Two things are added to the paper's filter, since walls have insides and grids have an end. A ball is taken to be at least two cubes
-//! wide, so that a gap of one cube does not have a node in every cube; such a ball clears neighbours only. And curves in spaces no wider
-//! than two cubes are left out unless they join what nothing else joins: they run between the shells of walls and through every lattice.
-//! The graph thus keeps pieces together, but not all of the loops that thinning keeps.
+//! Two things are added to the paper's filter, since walls have insides and grids have an end. A ball is taken to be at
+//! least two cubes wide, so that a gap of one cube does not have a node in every cube; such a ball clears neighbours
+//! only. And curves in spaces no wider than two cubes are left out unless they join what nothing else joins: they run
+//! between the shells of walls and through every lattice. The graph thus keeps pieces together, but not all of the
+//! loops that thinning keeps.
 
 use super::Node;
 use super::thinning::WIDE;
@@ -14,7 +16,8 @@ use super::voxels::{OFFSETS, VoxelGrid};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Smallest squared radius that a ball is taken to have. Cubes nearer than two cubes are neighbours: nothing is between them.
+/// Smallest squared radius that a ball is taken to have. Cubes nearer than two cubes are neighbours: nothing is between
+/// them.
 const SMALLEST: u32 = 4;
 
 /// Nodes that stay, and which of them are neighbours.
@@ -85,7 +88,8 @@ fn stretches(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<Stretch>
     found
 }
 
-/// The cubes of wide stretches, and of those narrow ones that join wide ones, the short before the long. All if nothing is wide.
+/// The cubes of wide stretches, and of those narrow ones that join wide ones, the short before the long. All if nothing
+/// is wide.
 fn worthwhile(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<usize> {
     let stretches = stretches(grid, squared, curve);
     if !stretches.iter().any(|s| s.wide) {
@@ -158,8 +162,8 @@ fn survivors(grid: &VoxelGrid, squared: &[u32], order: &[usize]) -> Vec<usize> {
     stay
 }
 
-/// Gives every cube of `curve` to the node of `stay` that is nearest along the curves (steps count their length; ties go to the smaller
-/// number), and joins the nodes whose cubes touch.
+/// Gives every cube of `curve` to the node of `stay` that is nearest along the curves (steps count their length; ties
+/// go to the smaller number), and joins the nodes whose cubes touch.
 fn contracted(grid: &VoxelGrid, curve: &[usize], stay: &[usize]) -> Vec<[u32; 2]> {
     const NOBODY: (u32, u32) = (u32::MAX, u32::MAX);
     // Distance and owner of cubes on curves.

@@ -1,9 +1,10 @@
-//! From any point to its node in constant time: every empty cube knows the node that is nearest to it through empty space.
+//! From any point to its node in constant time: every empty cube knows the node that is nearest to it through empty
+//! space.
 //!
-//! Distances count steps to the 26 neighbours with 3 over a face, 4 over an edge and 5 over a corner (Borgefors 1986), close to three
-//! times the Euclidean length. Whole numbers make ties exact; they go to the node with the smaller number. Since solid surfaces are
-//! closed against steps over corners, nobody gets a node on the other side of a wall; only pockets without any node, which the filter
-//! leaves, take that of their neighbours.
+//! Distances count steps to the 26 neighbours with 3 over a face, 4 over an edge and 5 over a corner (Borgefors 1986),
+//! close to three times the Euclidean length. Whole numbers make ties exact; they go to the node with the smaller
+//! number. Since solid surfaces are closed against steps over corners, nobody gets a node on the other side of a wall;
+//! only pockets without any node, which the filter leaves, take that of their neighbours.
 
 use super::voxels::{OFFSETS, VoxelGrid};
 use crate::math::Vec3;
@@ -35,8 +36,8 @@ pub struct NodeMap {
 }
 
 impl NodeMap {
-    /// Spreads the nodes, which stand in the cubes `nodes`, through the empty cubes of `space`, and then to all other empty cubes of
-    /// `grid`, the same or a grid with more of them.
+    /// Spreads the nodes, which stand in the cubes `nodes`, through the empty cubes of `space`, and then to all other
+    /// empty cubes of `grid`, the same or a grid with more of them.
     pub fn new(grid: &VoxelGrid, space: &VoxelGrid, nodes: &[usize]) -> NodeMap {
         let (_, mut labels) = spread(space, nodes);
         fill_pockets(grid, &mut labels);
@@ -80,15 +81,16 @@ impl NodeMap {
         }
     }
 
-    /// The node for the point `p` of a surface seen from the side of the unit vector `normal` (zero for a point in the air).
+    /// The node for the point `p` of a surface seen from the side of the unit vector `normal` (zero for a point in the
+    /// air).
     #[inline]
     pub fn node_of(&self, p: Vec3, normal: Vec3) -> Option<usize> {
         let at = (p - self.lo) / self.cell;
         STEPS_OFF.iter().find_map(|&s| self.label(at + normal * s)).or_else(|| self.near(at, normal))
     }
 
-    /// The nearest of the cubes around that has a node: of the 26 neighbours, or else of those one further out. Nearness is counted
-    /// from off the surface.
+    /// The nearest of the cubes around that has a node: of the 26 neighbours, or else of those one further out.
+    /// Nearness is counted from off the surface.
     #[cold]
     fn near(&self, at: Vec3, normal: Vec3) -> Option<usize> {
         [1.0, 2.0].into_iter().find_map(|scale| {
@@ -122,8 +124,8 @@ fn spread(grid: &VoxelGrid, nodes: &[usize]) -> (Vec<u32>, Vec<u32>) {
     (distances, labels)
 }
 
-/// Gives the empty cubes that no node reaches (pockets behind a cushion, in a plant) to the node nearest to them through solid
-/// cubes. `labels` as [`spread`] leaves them.
+/// Gives the empty cubes that no node reaches (pockets behind a cushion, in a plant) to the node nearest to them
+/// through solid cubes. `labels` as [`spread`] leaves them.
 fn fill_pockets(grid: &VoxelGrid, labels: &mut [u32]) {
     let reached: Vec<usize> = (0..grid.len()).filter(|&i| labels[i] != u32::MAX).collect();
     let unreached = |labels: &[u32], i: usize| labels[i] == u32::MAX;
@@ -140,8 +142,8 @@ fn fill_pockets(grid: &VoxelGrid, labels: &mut [u32]) {
     }
 }
 
-/// Lets labels flow from the `seeds`, whose distance is zero, through the cubes that are `open`. Dijkstra's algorithm with a ring of
-/// lists, one for each distance that may be waiting (Dial 1969).
+/// Lets labels flow from the `seeds`, whose distance is zero, through the cubes that are `open`. Dijkstra's algorithm
+/// with a ring of lists, one for each distance that may be waiting (Dial 1969).
 fn flow(grid: &VoxelGrid, seeds: Vec<usize>, distances: &mut [u32], labels: &mut [u32], open: impl Fn(usize) -> bool) {
     let steps: Vec<(isize, u32)> = grid.steps().into_iter().zip(OFFSETS.map(step_length)).collect();
     let mut waiting = seeds.len();

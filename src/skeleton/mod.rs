@@ -1,9 +1,10 @@
 //! The skeleton of empty space: few nodes in the middle of rooms and passages, and a map from any point to its node.
 //!
-//! What is seen from a node is much like what is seen from the surfaces around it, so that knowledge about visibility can be kept
-//! at nodes and shared by all points that belong to them (Noël and Biri 2015). Steps of the construction: [`voxels`] makes the scene
-//! solid cubes, [`reachable_space`] fills parts that no path reaches, [`distance`] computes each empty cube's distance to solid ones,
-//! [`thinning`] reduces empty space to curves, [`graph`] selects few nodes on them, [`map`] assigns a node to every empty cube.
+//! What is seen from a node is much like what is seen from the surfaces around it, so that knowledge about visibility
+//! can be kept at nodes and shared by all points that belong to them (Noël and Biri 2015). Steps of the construction:
+//! [`voxels`] makes the scene solid cubes, [`reachable_space`] fills parts that no path reaches, [`distance`] computes
+//! each empty cube's distance to solid ones, [`thinning`] reduces empty space to curves, [`graph`] selects few nodes on
+//! them, [`map`] assigns a node to every empty cube.
 
 pub mod distance;
 pub mod floating_components;
@@ -30,7 +31,8 @@ pub const DEFAULT_CELLS: usize = 120;
 pub struct Node {
     /// Where it is, in the space of the prepared scene.
     pub position: Vec3,
-    /// Radius of the largest empty ball around it, in scene units: the distance to the middle of the nearest solid cube.
+    /// Radius of the largest empty ball around it, in scene units: the distance to the middle of the nearest solid
+    /// cube.
     pub radius: f32,
 }
 
@@ -47,9 +49,10 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
-    /// The skeleton of the empty space of `scene`: of the parts that hold the camera, what it sees, or a light, and without far
-    /// surroundings ([`reachable_space`]). `cells`: cubes along the longest side; if not given, [`DEFAULT_CELLS`], or more for flat scenes
-    /// ([`VoxelGrid::suggested_cells`]). Empty if there is nothing, or nothing empty. The same for any number of threads.
+    /// The skeleton of the empty space of `scene`: of the parts that hold the camera, what it sees, or a light, and
+    /// without far surroundings ([`reachable_space`]). `cells`: cubes along the longest side; if not given,
+    /// [`DEFAULT_CELLS`], or more for flat scenes ([`VoxelGrid::suggested_cells`]). Empty if there is nothing, or
+    /// nothing empty. The same for any number of threads.
     pub fn of_scene(scene: &PreparedScene, cells: Option<usize>) -> Skeleton {
         let places = reachable_space::places(scene);
         let Some(bounds) = scene.geometry.bounds() else { return Skeleton::of(&scene.geometry, DEFAULT_CELLS) };
@@ -63,8 +66,8 @@ impl Skeleton {
         Skeleton::of_grid(&VoxelGrid::of_geometry(geometry, cells), &Places::default())
     }
 
-    /// The skeleton of the empty cubes of `grid`, whose outermost layer must be solid: of the parts that hold one of `places`, or of
-    /// all if none does.
+    /// The skeleton of the empty cubes of `grid`, whose outermost layer must be solid: of the parts that hold one of
+    /// `places`, or of all if none does.
     pub fn of_grid(grid: &VoxelGrid, places: &Places) -> Skeleton {
         let space = reachable_space::closed_off(grid, places);
         let squared = distance::squared_distances(&space);
@@ -74,8 +77,9 @@ impl Skeleton {
         Skeleton { nodes: graph.nodes, edges: graph.edges, unfiltered: curve.len(), map }
     }
 
-    /// The node that the point `p` of a surface belongs to, seen from the side to which the unit vector `normal` points; a zero
-    /// `normal` for a point that is on no surface. Constant time. `None` where no empty space with a node is near.
+    /// The node that the point `p` of a surface belongs to, seen from the side to which the unit vector `normal`
+    /// points; a zero `normal` for a point that is on no surface. Constant time. `None` where no empty space with a
+    /// node is near.
     #[inline]
     pub fn node_of(&self, p: Vec3, normal: Vec3) -> Option<usize> {
         self.map.node_of(p, normal)

@@ -1,11 +1,11 @@
 //! Reachable parts of empty space: those that hold the camera, a point it sees, or a light.
 //!
-//! A house may stand on a wide ground, on which most cubes of a grid would be wasted: the grid ends not far beyond the visible points.
-//! Points outside of the grid have no node.
+//! A house may stand on a wide ground, on which most cubes of a grid would be wasted: the grid ends not far beyond the
+//! visible points. Points outside of the grid have no node.
 //!
-//! Walls, columns and cupboards of real scenes are hollow, and cavities may be larger than rooms together; as closed parts of empty space
-//! they would have more nodes than the rooms. Paths hardly ever get there. Where one does after all (through glass, through a gap
-//! finer than a cube), its points belong to the nearest node elsewhere.
+//! Walls, columns and cupboards of real scenes are hollow, and cavities may be larger than rooms together; as closed
+//! parts of empty space they would have more nodes than the rooms. Paths hardly ever get there. Where one does after
+//! all (through glass, through a gap finer than a cube), its points belong to the nearest node elsewhere.
 
 use super::voxels::VoxelGrid;
 use crate::emit::Light;
@@ -15,7 +15,8 @@ use crate::ray::Ray;
 
 /// Columns and rows of rays that look at the scene.
 const VIEW: [u32; 2] = [48, 32];
-/// How far from a surface its part of space is looked for, in cubes: in the next one, never beyond a wall that is close.
+/// How far from a surface its part of space is looked for, in cubes: in the next one, never beyond a wall that is
+/// close.
 const STEP_OFF: f32 = 1.0;
 
 /// Share of what is seen that may be further out than the rest, on each side.
@@ -60,8 +61,8 @@ pub fn places(scene: &PreparedScene) -> Places {
     Places { ends, seen }
 }
 
-/// The part of the box `bounds` that a grid should cover: where the ends are and most of what is seen, and as much again on each side;
-/// all if that is not much smaller.
+/// The part of the box `bounds` that a grid should cover: where the ends are and most of what is seen, and as much
+/// again on each side; all if that is not much smaller.
 pub fn region(bounds: (Vec3, Vec3), places: &Places) -> (Vec3, Vec3) {
     let (lo, hi) = bounds;
     let mut core = (hi, lo);
@@ -84,8 +85,8 @@ pub fn region(bounds: (Vec3, Vec3), places: &Places) -> (Vec3, Vec3) {
     if longest(part) < MUCH_SMALLER * longest(bounds) { part } else { bounds }
 }
 
-/// `grid` with everything solid that does not hang together with an end, or with a fair share of what is seen; unchanged if no place is
-/// in empty space.
+/// `grid` with everything solid that does not hang together with an end, or with a fair share of what is seen;
+/// unchanged if no place is in empty space.
 pub fn closed_off(grid: &VoxelGrid, places: &Places) -> VoxelGrid {
     let mut space = VoxelGrid { solid: vec![true; grid.len()], ..grid.clone() };
     let cube = |&(p, normal): &Place| grid.cell_of(p + normal * (STEP_OFF * grid.cell)).filter(|&i| !grid.solid[i]);

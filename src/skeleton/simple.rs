@@ -1,8 +1,10 @@
-//! What a cube's neighbourhood says: may the cube go without changing the topology, and does it hold two parts together?
+//! What a cube's neighbourhood says: may the cube go without changing the topology, and does it hold two parts
+//! together?
 //!
-//! An object whose cubes touch over faces, edges or corners (26 neighbours), in a background whose cubes touch over faces (6). A cube
-//! is *simple* if the object's other cubes around it are one piece and if the background within its 18 neighbours that reaches a
-//! face of it is one piece (Bertrand and Malandain 1994). Removing a simple cube neither splits, joins, opens nor closes anything.
+//! An object whose cubes touch over faces, edges or corners (26 neighbours), in a background whose cubes touch over
+//! faces (6). A cube is *simple* if the object's other cubes around it are one piece and if the background within its
+//! 18 neighbours that reaches a face of it is one piece (Bertrand and Malandain 1994). Removing a simple cube neither
+//! splits, joins, opens nor closes anything.
 
 /// Bit of the cube itself in a neighbourhood of 27 bits; bit x + 3y + 9z.
 pub const CENTRE: u32 = 1 << 13;
@@ -60,7 +62,8 @@ fn flood(set: u32, seed: u32, touch: &[u32; 27]) -> u32 {
     found
 }
 
-/// In how many pieces the object's cubes around the middle lie; 0: the middle is alone. `object` has a bit for each cube of it.
+/// In how many pieces the object's cubes around the middle lie; 0: the middle is alone. `object` has a bit for each
+/// cube of it.
 #[inline]
 pub fn pieces(object: u32) -> u32 {
     let (mut rest, mut count) = (object & AROUND, 0);

@@ -1,14 +1,14 @@
 //! Thinning: empty space shrinks, layer by layer, to curves in its middle.
 //!
-//! Cubes go in the order of their distance to what is solid, so that what is left is centred; only simple cubes go, so that every
-//! room stays in one piece and every way around something stays a loop; and a cube that holds two parts together when its turn comes
-//! (an *isthmus* of dimension one, Bertrand and Couprie 2014) stays for ever, so that curves are left and not points. Sheets are not
-//! kept: they are eaten from their borders until they are curves as well. Nor are isthmuses in gaps a cube or two wide: curves run
-//! through them only where they lead somewhere.
+//! Cubes go in the order of their distance to what is solid, so that what is left is centred; only simple cubes go, so
+//! that every room stays in one piece and every way around something stays a loop; and a cube that holds two parts
+//! together when its turn comes (an *isthmus* of dimension one, Bertrand and Couprie 2014) stays for ever, so that
+//! curves are left and not points. Sheets are not kept: they are eaten from their borders until they are curves as
+//! well. Nor are isthmuses in gaps a cube or two wide: curves run through them only where they lead somewhere.
 //!
-//! One pass takes one layer of cubes: those that are simple when it begins. They are removed in eight turns, each of cubes whose
-//! coordinates have the same parities. Two of those never touch, so that a turn is decided in parallel and its result does not depend
-//! on any order.
+//! One pass takes one layer of cubes: those that are simple when it begins. They are removed in eight turns, each of
+//! cubes whose coordinates have the same parities. Two of those never touch, so that a turn is decided in parallel and
+//! its result does not depend on any order.
 
 use super::floating_components::bridge;
 use super::simple::{CENTRE, is_border, is_simple, pieces};
@@ -22,7 +22,8 @@ pub const WIDE: u32 = 4;
 /// Cubes that one thread takes at a time.
 const CHUNK: usize = 2048;
 
-/// Cubes of the curves, in ascending order of their numbers. `squared` are the squared distances to what is solid, in cubes.
+/// Cubes of the curves, in ascending order of their numbers. `squared` are the squared distances to what is solid, in
+/// cubes.
 pub fn curves(grid: &VoxelGrid, squared: &[u32]) -> Vec<usize> {
     let mut object = bridge(grid, squared);
     let layers: Vec<u16> = squared.iter().map(|&d| (f64::from(d).sqrt() * LAYERS_PER_CUBE).floor() as u16).collect();
@@ -30,8 +31,8 @@ pub fn curves(grid: &VoxelGrid, squared: &[u32]) -> Vec<usize> {
     (0..object.len()).filter(|&i| object[i]).collect()
 }
 
-/// Takes cubes away from `object`, lower layers first; isthmuses for which `keeps` holds stay, and are returned. Nothing of `object` may
-/// be in the rim of the grid.
+/// Takes cubes away from `object`, lower layers first; isthmuses for which `keeps` holds stay, and are returned.
+/// Nothing of `object` may be in the rim of the grid.
 fn thin(grid: &VoxelGrid, object: &mut [bool], layers: &[u16], keeps: impl Fn(usize) -> bool + Sync) -> Vec<bool> {
     let around = Around::new(grid);
     let mut by_layer: Vec<Vec<usize>> = Vec::new();
@@ -113,7 +114,8 @@ impl Around {
     }
 }
 
-/// One pass over `cubes`: notes isthmuses in `kept`, removes what is simple now and when its turn comes. Returns what went.
+/// One pass over `cubes`: notes isthmuses in `kept`, removes what is simple now and when its turn comes. Returns what
+/// went.
 fn pass(
     around: &Around,
     object: &mut [bool],
@@ -157,7 +159,8 @@ mod tests {
         squared.iter().map(|&d| f64::from(d).sqrt() as u16).collect()
     }
 
-    /// What thinning must leave alone: pieces of the object (26 neighbours), pieces of the background (6), Euler characteristic.
+    /// What thinning must leave alone: pieces of the object (26 neighbours), pieces of the background (6), Euler
+    /// characteristic.
     fn topology(grid: &VoxelGrid, object: &[bool]) -> (usize, usize, i64) {
         let count = |of: bool, axes: i64| {
             let mut seen = vec![false; object.len()];

@@ -1,9 +1,9 @@
 //! A scene as cubes: those that a surface passes through are solid, all others are empty space.
 //!
-//! The voxelisation is conservative: a cube is solid if a triangle touches it at all (separating axes, Akenine-Möller 2001; columns
-//! along the triangle's main axis, after Schwarz and Seidel 2010), so that no path from neighbour to neighbour, not even over the
-//! corners of cubes, passes through a surface. The outermost layer of cubes is solid as well: an open scene ends there, as if the
-//! box around it were a room.
+//! The voxelisation is conservative: a cube is solid if a triangle touches it at all (separating axes, Akenine-Möller
+//! 2001; columns along the triangle's main axis, after Schwarz and Seidel 2010), so that no path from neighbour to
+//! neighbour, not even over the corners of cubes, passes through a surface. The outermost layer of cubes is solid as
+//! well: an open scene ends there, as if the box around it were a room.
 
 use crate::math::Vec3;
 use crate::ray::Geometry;
@@ -41,8 +41,8 @@ impl VoxelGrid {
         grid
     }
 
-    /// Voxelises everything that a ray can meet, with about `cells` cubes along the longest side; fewer where the grid would hold more
-    /// than five sixths of `cells`³ cubes. No geometry gives a grid without cubes.
+    /// Voxelises everything that a ray can meet, with about `cells` cubes along the longest side; fewer where the grid
+    /// would hold more than five sixths of `cells`³ cubes. No geometry gives a grid without cubes.
     pub fn of_geometry(geometry: &Geometry, cells: usize) -> VoxelGrid {
         geometry.bounds().map(|bounds| VoxelGrid::of_region(geometry, bounds, cells)).unwrap_or_default()
     }
@@ -70,8 +70,8 @@ impl VoxelGrid {
         grid
     }
 
-    /// A good number of `cells` for a box: `base`, or more where it is flat, as far as the grid then still is no larger than `base`³ / 2
-    /// cubes and `2 · base` long. Low buildings would be a few cubes high otherwise.
+    /// A good number of `cells` for a box: `base`, or more where it is flat, as far as the grid then still is no larger
+    /// than `base`³ / 2 cubes and `2 · base` long. Low buildings would be a few cubes high otherwise.
     pub fn suggested_cells((lo, hi): (Vec3, Vec3), base: usize) -> usize {
         let fits = |cells: usize| {
             frame(lo, hi, cells).is_some_and(|g| g.dims.iter().product::<usize>() <= base * base * base / 2)
@@ -120,7 +120,8 @@ impl VoxelGrid {
         at.into_iter().zip(self.dims).any(|(c, n)| c == 0 || c + 1 == n)
     }
 
-    /// Steps in numbers from a cube to its 26 neighbours, in the order of [`OFFSETS`]; valid for cubes that are not in the rim.
+    /// Steps in numbers from a cube to its 26 neighbours, in the order of [`OFFSETS`]; valid for cubes that are not in
+    /// the rim.
     pub fn steps(&self) -> [isize; 26] {
         let [nx, ny, _] = self.dims.map(|d| d as isize);
         OFFSETS.map(|[x, y, z]| x + nx * (y + ny * z))
@@ -141,8 +142,8 @@ pub const OFFSETS: [[isize; 3]; 26] = {
     list
 };
 
-/// A grid around a box, with one layer to spare. The faces of the longest side go through the middle of cubes: on the border between
-/// two, they would make both solid.
+/// A grid around a box, with one layer to spare. The faces of the longest side go through the middle of cubes: on the
+/// border between two, they would make both solid.
 fn frame(lo: Vec3, hi: Vec3, cells: usize) -> Option<VoxelGrid> {
     let size = hi - lo;
     let longest = size.max_element();
@@ -202,8 +203,8 @@ fn mark_triangle(corners: [Vec3; 3], dims: [usize; 3], mut mark: impl FnMut(usiz
     }
 }
 
-/// Does the triangle touch the cube around the origin? True if no axis separates them: three of the cube, the triangle's normal, nine
-/// cross products of edges. An axis of length zero separates nothing.
+/// Does the triangle touch the cube around the origin? True if no axis separates them: three of the cube, the
+/// triangle's normal, nine cross products of edges. An axis of length zero separates nothing.
 fn touches(c: [Vec3; 3], half: f32) -> bool {
     let separates = |axis: Vec3| {
         let p = c.map(|c| c.dot(axis));

@@ -1,11 +1,13 @@
-//! Radius queries over many points, by a hash table of grid cells (Teschner et al. 2003, "Optimized Spatial Hashing for Collision
-//! Detection of Deformable Objects").
+//! Radius queries over many points, by a hash table of grid cells (Teschner et al. 2003, "Optimized Spatial Hashing for
+//! Collision Detection of Deformable Objects").
 //!
-//! Cells are as long as the radius, so that a query looks at three cells along each axis. Neighbours along x have neighbouring buckets: a
-//! query reads nine runs of points and not 27. Points are sorted by bucket, and by number inside a bucket.
+//! Cells are as long as the radius, so that a query looks at three cells along each axis. Neighbours along x have
+//! neighbouring buckets: a query reads nine runs of points and not 27. Points are sorted by bucket, and by number
+//! inside a bucket.
 //!
-//! Everything is exact. The cell of a coordinate is a monotone function of it, rounding included, so that no point is missed between the
-//! cells of the two ends of a query's interval; and a point that another row of cells has put into the same bucket is told by its cell.
+//! Everything is exact. The cell of a coordinate is a monotone function of it, rounding included, so that no point is
+//! missed between the cells of the two ends of a query's interval; and a point that another row of cells has put into
+//! the same bucket is told by its cell.
 
 use super::light_tree::Aabb;
 use crate::math::Vec3;
@@ -49,8 +51,8 @@ struct GridPoint {
 }
 
 impl HashGrid {
-    /// Builds the grid anew over `positions` (fewer than 2³², in scene units) for queries of the given radius. The result is the same for
-    /// any number of threads. Points with a coordinate that is not finite are never found.
+    /// Builds the grid anew over `positions` (fewer than 2³², in scene units) for queries of the given radius. The
+    /// result is the same for any number of threads. Points with a coordinate that is not finite are never found.
     ///
     /// # Panics
     /// If the radius is negative or not a number.
@@ -60,7 +62,8 @@ impl HashGrid {
         let bounds = if bounds.min.is_finite() { bounds } else { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } };
         self.radius = radius;
         self.origin = bounds.min;
-        // A little longer than the radius: a query's interval, which has a margin for rounding, spans three cells and never four.
+        // A little longer than the radius: a query's interval, which has a margin for rounding, spans three cells and
+        // never four.
         self.scale = 1.0 / (radius * 1.00001).max(bounds.extent().max_element() / MAX_CELLS).max(1e-30);
         self.last = [0, 1, 2].map(|axis| self.cell(bounds.max[axis], axis));
         let buckets = (positions.len() * BUCKETS_PER_POINT).next_power_of_two().max(MIN_BUCKETS);
@@ -71,8 +74,9 @@ impl HashGrid {
         self.sort(positions, buckets.min(MAX_PARTS));
     }
 
-    /// Calls `visit` for every point within the radius of `centre` (squared distances are compared, in single precision), with its number
-    /// in the list that the grid was built from and its squared distance. The order depends on nothing but the points and `centre`.
+    /// Calls `visit` for every point within the radius of `centre` (squared distances are compared, in single
+    /// precision), with its number in the list that the grid was built from and its squared distance. The order depends
+    /// on nothing but the points and `centre`.
     #[inline]
     pub fn for_each_within(&self, centre: Vec3, mut visit: impl FnMut(usize, f32)) {
         let radius2 = self.radius * self.radius;
@@ -172,7 +176,8 @@ impl HashGrid {
         (self.points, self.starts, self.half_sorted) = (points, starts, half_sorted);
     }
 
-    /// Writes all points to `to`, sorted by the part of the table that their bucket belongs to, and returns the number of points of each part.
+    /// Writes all points to `to`, sorted by the part of the table that their bucket belongs to, and returns the number
+    /// of points of each part.
     fn distribute(&self, positions: &[Vec3], parts: usize, to: &mut [GridPoint]) -> Vec<usize> {
         let shift = self.bits - parts.ilog2();
         let part_of = |p: Vec3| self.bucket(p) >> shift;
@@ -291,7 +296,8 @@ mod tests {
             check(&points, radius * size, &centres);
         }
 
-        /// Points on a lattice with the radius as its constant: neighbours are exactly as far as the radius, up to rounding.
+        /// Points on a lattice with the radius as its constant: neighbours are exactly as far as the radius, up to
+        /// rounding.
         #[test]
         fn finds_neighbours_at_exactly_the_radius(cell in 1e-3f32..10.0, offset in -100.0f32..100.0) {
             let points: Vec<Vec3> = (0..6 * 6 * 6)

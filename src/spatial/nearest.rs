@@ -1,11 +1,11 @@
 //! Nearest neighbours of a surface point among a fixed set of oriented points.
 //!
-//! Every vertex of every sub-path queries, so results are cached: space is divided into cells, each with one slot for each of six
-//! directions that a surface may face, and a slot is filled by a search from the middle of its cell at its first query. The result is a
-//! function of cell and facing alone, whatever the order of queries.
+//! Every vertex of every sub-path queries, so results are cached: space is divided into cells, each with one slot for
+//! each of six directions that a surface may face, and a slot is filled by a search from the middle of its cell at its
+//! first query. The result is a function of cell and facing alone, whatever the order of queries.
 //!
-//! With [`Metric::Facing`] only points whose surface faces about the same way are found: a point on the other side of a thin wall is near,
-//! but sees another room.
+//! With [`Metric::Facing`] only points whose surface faces about the same way are found: a point on the other side of a
+//! thin wall is near, but sees another room.
 
 use crate::math::Vec3;
 use std::ops::Range;
@@ -135,8 +135,8 @@ fn search(points: &[Vec3], tree: &[u32], axis: usize, p: Vec3, best: &mut Best) 
 }
 
 impl NearestPoints {
-    /// An index of `points` with the unit normals of their surfaces' sides. At most 2²¹ − 1 points are indexed; later ones are
-    /// never found.
+    /// An index of `points` with the unit normals of their surfaces' sides. At most 2²¹ − 1 points are indexed; later
+    /// ones are never found.
     pub fn new(points: Vec<Vec3>, normals: Vec<Vec3>, metric: Metric) -> NearestPoints {
         let most = points.len().min(normals.len()).min(NO_POINT as usize);
         let trees = std::array::from_fn(|f| {
@@ -153,7 +153,8 @@ impl NearestPoints {
         NearestPoints { metric, points, normals, trees, lo, per_cell, cells, slots, groups: None }
     }
 
-    /// From now on only points of the nearest one's group are found; `groups` are ranges that have every point in one of them.
+    /// From now on only points of the nearest one's group are found; `groups` are ranges that have every point in one
+    /// of them.
     pub fn within_groups(mut self, groups: &[Range<usize>]) -> NearestPoints {
         self.groups = Some(groups.iter().flat_map(|g| std::iter::repeat_n(g.clone(), g.len())).collect());
         self
@@ -179,8 +180,8 @@ impl NearestPoints {
         &self.normals
     }
 
-    /// Numbers of the points nearest to `p` (up to the size of a cell) among those whose surface faces about as `n` does, nearest
-    /// first; fewer than [`MAX_NEIGHBORS`] where there are not so many.
+    /// Numbers of the points nearest to `p` (up to the size of a cell) among those whose surface faces about as `n`
+    /// does, nearest first; fewer than [`MAX_NEIGHBORS`] where there are not so many.
     #[inline]
     pub fn find(&self, p: Vec3, n: Vec3) -> impl Iterator<Item = usize> + use<> {
         let cell = ((p - self.lo) * self.per_cell).to_array();

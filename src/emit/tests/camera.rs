@@ -64,8 +64,8 @@ fn a_point_on_a_ray_is_seen_where_the_ray_started() {
     }
 }
 
-/// A wall of unit radiance, seen by connecting its points to the lens: every pixel must get one, and directions must integrate to one
-/// per pixel too.
+/// A wall of unit radiance, seen by connecting its points to the lens: every pixel must get one, and directions must
+/// integrate to one per pixel too.
 #[test]
 fn a_pixel_measures_mean_radiance() {
     for (desc, camera) in cameras() {

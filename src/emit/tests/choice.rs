@@ -44,7 +44,8 @@ fn places() -> Vec<(Vec3, Option<Vec3>)> {
     places
 }
 
-/// Two finely tessellated emitters, one round and one flat, of unlike triangles: from most places parts of them count as one light.
+/// Two finely tessellated emitters, one round and one flat, of unlike triangles: from most places parts of them count
+/// as one light.
 fn tessellated() -> LightSet {
     let (n, mut lights) = (24, Vec::new());
     for k in 0..n * n {

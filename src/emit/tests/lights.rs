@@ -75,7 +75,8 @@ fn direct_densities_agree_with_their_samples() {
     }
 }
 
-/// χ² of points on triangles (in the unit square that is folded onto them) against the integral of the density, which must also be 1.
+/// χ² of points on triangles (in the unit square that is folded onto them) against the integral of the density, which
+/// must also be 1.
 #[test]
 fn points_on_triangles_are_distributed_as_their_density() {
     const CELLS: usize = 6;
@@ -287,8 +288,8 @@ fn emission_carries_the_power_and_agrees_with_its_densities() {
     }
 }
 
-/// The same density either way round: the area density of the vertex after the light, times the light vertex's, is the Jacobian of the
-/// same pair of points.
+/// The same density either way round: the area density of the vertex after the light, times the light vertex's, is the
+/// Jacobian of the same pair of points.
 #[test]
 fn infinite_lights_follow_the_vertex_conventions() {
     let (_, light) = all_lights().into_iter().find(|(n, _)| *n == "map").unwrap();

@@ -79,8 +79,9 @@ fn environment_maps() {
     }
 }
 
-/// `perspective` (with principal point offset 0.1, −0.2) and `thinlens` (radius 0.3, focus 4), full film w × h, crop (30, 20) 150 × 100, near
-/// 0.5, far 100, field of view 50°: `sample_ray` at (¼, ¾) of the crop window, lens sample (0.3, 0.9). Rays start on the near plane.
+/// `perspective` (with principal point offset 0.1, −0.2) and `thinlens` (radius 0.3, focus 4), full film w × h, crop
+/// (30, 20) 150 × 100, near 0.5, far 100, field of view 50°: `sample_ray` at (¼, ¾) of the crop window, lens sample
+/// (0.3, 0.9). Rays start on the near plane.
 #[test]
 #[rustfmt::skip]
 fn camera_rays() {
@@ -142,9 +143,9 @@ fn spot_falloff() {
     compare("spot", |p| spot.sample_direct(p).map_or(Rgb::BLACK, |s| s.radiance), &cases, 2e-4);
 }
 
-/// `sunsky` with the sky at half and the sun at twice its strength, `to_world` a rotation by −90° around x (so +y is up), the sun's
-/// direction given in light space here and in the world to Mitsuba. Mitsuba computes the solid angle of the sun in single precision,
-/// which costs it up to 0.3 %.
+/// `sunsky` with the sky at half and the sun at twice its strength, `to_world` a rotation by −90° around x (so +y is
+/// up), the sun's direction given in light space here and in the world to Mitsuba. Mitsuba computes the solid angle of
+/// the sun in single precision, which costs it up to 0.3 %.
 #[test]
 #[rustfmt::skip]
 fn sky_and_sun() {

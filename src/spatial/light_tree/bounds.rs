@@ -125,8 +125,8 @@ pub struct LightBounds<P = f32> {
 }
 
 impl<P: Power> LightBounds<P> {
-    /// Cost of treating the cluster as one source, by the surface area orientation heuristic. All sides of the box are made longer by
-    /// `thickness`, so that the cost of flat and point-like clusters still depends on their size.
+    /// Cost of treating the cluster as one source, by the surface area orientation heuristic. All sides of the box are
+    /// made longer by `thickness`, so that the cost of flat and point-like clusters still depends on their size.
     pub fn cost(&self, thickness: f32) -> f32 {
         let d = self.aabb.extent() + Vec3::splat(thickness);
         let area = 2.0 * (d.x * d.y + d.y * d.z + d.z * d.x);

@@ -1,7 +1,7 @@
 //! Cuts through a light tree: clusters that a receiver can treat as one source each.
 //!
-//! A cut begins with the root and always splits the cluster with the largest bound on its error, as lightcuts do (Walter et al. 2005).
-//! The clusters of a cut are a partition of all sources.
+//! A cut begins with the root and always splits the cluster with the largest bound on its error, as lightcuts do
+//! (Walter et al. 2005). The clusters of a cut are a partition of all sources.
 
 use super::bounds::LightCluster;
 use super::{LightTree, Node};
@@ -17,7 +17,8 @@ pub struct ReceiverBounds {
     pub centre: Vec3,
     /// Radius of the ball.
     pub radius: f32,
-    /// Unit normal of the receivers: they receive nothing from below its horizon. Zero if they have no normal in common.
+    /// Unit normal of the receivers: they receive nothing from below its horizon. Zero if they have no normal in
+    /// common.
     pub normal: Vec3,
 }
 
@@ -26,7 +27,8 @@ pub struct ReceiverBounds {
 pub struct CutLimits {
     /// Largest number of clusters.
     pub max_clusters: usize,
-    /// No cluster is split whose error bound is below this (in units of weight / distance²); 0 if only the number of clusters counts.
+    /// No cluster is split whose error bound is below this (in units of weight / distance²); 0 if only the number of
+    /// clusters counts.
     pub max_error: f32,
 }
 
@@ -61,8 +63,8 @@ impl Ord for CutNode {
 pub struct CutScratch(BinaryHeap<CutNode>);
 
 impl<C: LightCluster> LightTree<C> {
-    /// Bound on the error of treating the sources of `node` as one: their weight times the range of 1/distance² over cluster and
-    /// receivers. The receivers' radius softens the range: no cut resolves differences within the ball.
+    /// Bound on the error of treating the sources of `node` as one: their weight times the range of 1/distance² over
+    /// cluster and receivers. The receivers' radius softens the range: no cut resolves differences within the ball.
     #[inline]
     fn error_bound(&self, node: &Node<C>, receivers: &ReceiverBounds) -> f32 {
         let aabb = node.cluster.aabb();
@@ -73,14 +75,16 @@ impl<C: LightCluster> LightTree<C> {
         }
         let distance = to.length();
         let (near, far) = ((distance - radius).max(0.0), distance + radius);
-        // At least a fraction of the cluster: otherwise a single source next to the receivers would be isolated before anything else is split.
+        // At least a fraction of the cluster: otherwise a single source next to the receivers would be isolated before
+        // anything else is split.
         let soft = receivers.radius * receivers.radius;
         let soft = soft.max(0.01 * radius * radius).max(f32::MIN_POSITIVE);
         let weight = self.weights.weight(&node.range()) as f32;
         weight * (1.0 / (near * near + soft) - 1.0 / (far * far + soft)).max(0.0)
     }
 
-    /// The clusters of a cut for `receivers`: ranges of sources, left in `clusters` in ascending order. They are a partition of all sources.
+    /// The clusters of a cut for `receivers`: ranges of sources, left in `clusters` in ascending order. They are a
+    /// partition of all sources.
     pub fn cut(
         &self,
         receivers: &ReceiverBounds,

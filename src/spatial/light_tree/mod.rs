@@ -1,12 +1,15 @@
-//! A tree over weighted light sources, for all that samples or clusters them: emitters of a scene, and stored light vertices.
+//! A tree over weighted light sources, for all that samples or clusters them: emitters of a scene, and stored light
+//! vertices.
 //!
-//! [`LightTree`] is a binary tree. A node is a range of the sources, and has the bounds of its sources as a [`LightCluster`]: a box
-//! ([`Aabb`]), or box, cone of normals and power ([`LightBounds`]). How sets are split is up to a [`SplitRule`]. Prefix sums give the
-//! weight of any node, and draw a representative of it by weight. There are two ways through the tree:
+//! [`LightTree`] is a binary tree. A node is a range of the sources, and has the bounds of its sources as a
+//! [`LightCluster`]: a box ([`Aabb`]), or box, cone of normals and power ([`LightBounds`]). How sets are split is up to
+//! a [`SplitRule`]. Prefix sums give the weight of any node, and draw a representative of it by weight. There are two
+//! ways through the tree:
 //!
 //! * [`LightTree::cut`]: clusters for receivers, split where the error is largest;
-//! * [`WideLightTree`]: one source for a point, drawn from root to leaf by bounds on its contribution, and the probability of that. It
-//!   is a copy of a binary tree with eight children a node, whose importances are computed side by side.
+//! * [`WideLightTree`]: one source for a point, drawn from root to leaf by bounds on its contribution, and the
+//!   probability of that. It is a copy of a binary tree with eight children a node, whose importances are computed side
+//!   by side.
 
 pub mod bounds;
 pub mod cut;
@@ -116,8 +119,8 @@ impl<C> Default for LightTree<C> {
 }
 
 impl<C: LightCluster> LightTree<C> {
-    /// Builds the tree anew, in the memory of the old one. `rule` puts the sources in order; ranges are ranges of that order. Sets of at
-    /// most `max_leaf` sources are not split.
+    /// Builds the tree anew, in the memory of the old one. `rule` puts the sources in order; ranges are ranges of that
+    /// order. Sets of at most `max_leaf` sources are not split.
     pub fn build<S: LightSource<Cluster = C>>(&mut self, sources: &mut [S], rule: &impl SplitRule<S>, max_leaf: usize) {
         self.nodes.clear();
         if let Some(any) = sources.first() {
@@ -175,8 +178,8 @@ impl<C> LightTree<C> {
         self.weights.weight(range)
     }
 
-    /// Draws a representative of a range of sources in proportion to weight, and returns it with its probability. `u` is a random number
-    /// in [0, 1). `None` if the range has no weight.
+    /// Draws a representative of a range of sources in proportion to weight, and returns it with its probability. `u`
+    /// is a random number in [0, 1). `None` if the range has no weight.
     #[inline]
     pub fn sample_in(&self, range: &Range<usize>, u: f32) -> Option<(usize, f64)> {
         let source = self.weights.sample(range, f64::from(u))?;

@@ -6,12 +6,13 @@ use crate::math::Vec3;
 
 /// A rule that divides a set of light sources in two.
 pub trait SplitRule<S: LightSource> {
-    /// Orders `sources`, which are at least two, and returns the number of those in the first half; neither half is empty. `first` is the
-    /// index of the first source among all of the tree, `depth` the number of splits above.
+    /// Orders `sources`, which are at least two, and returns the number of those in the first half; neither half is
+    /// empty. `first` is the index of the first source among all of the tree, `depth` the number of splits above.
     fn split(&self, sources: &mut [S], first: usize, depth: u32) -> usize;
 }
 
-/// Splits points in Morton order where the highest differing bit of their codes changes, or in the middle if all codes are equal.
+/// Splits points in Morton order where the highest differing bit of their codes changes, or in the middle if all codes
+/// are equal.
 #[derive(Clone, Copy, Debug)]
 pub struct MortonSplit<'a> {
     /// Morton codes of all points, sorted ([`crate::spatial::morton`]).
@@ -31,8 +32,8 @@ impl SplitRule<WeightedPoint> for MortonSplit<'_> {
     }
 }
 
-/// Splits at the cheapest bucket boundary of the surface area orientation heuristic (Conty Estevez & Kulla 2018, §4.4), or in the middle
-/// if there is none or the tree is deep.
+/// Splits at the cheapest bucket boundary of the surface area orientation heuristic (Conty Estevez & Kulla 2018, §4.4),
+/// or in the middle if there is none or the tree is deep.
 #[derive(Clone, Copy, Debug)]
 pub struct SaohSplit {
     /// From this depth on sets are halved by count, so that the depth of the tree is bounded.

@@ -190,7 +190,8 @@ fn an_error_bound_ends_a_cut_and_holds() {
         tree.cut(&RECEIVERS, CutLimits { max_clusters: usize::MAX, max_error }, &mut scratch, &mut cut);
         sizes.push(cut.len());
         for range in cut.iter().filter(|range| range.len() > 1) {
-            // No receiver and no two sources of a cluster may differ by more than the bound, above the softening within the ball.
+            // No receiver and no two sources of a cluster may differ by more than the bound, above the softening within
+            // the ball.
             let own = &sources[range.clone()];
             let inverse2 = |s: &OrientedSource<Rgb>| {
                 let to = s.bounds.aabb.centre() - RECEIVERS.centre;

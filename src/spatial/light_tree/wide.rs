@@ -1,13 +1,13 @@
 //! Sampling of one light source for a point, by a tree with eight children a node.
 //!
-//! Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting": importance of §5.1 without splitting, with
-//! the distance kept from falling below the node's radius. Three levels of the binary tree become one, so that the importances of eight
-//! children are computed side by side. A walk from the root draws one source; the probability of any source is the product along its
-//! own path, which is stored as bits.
+//! Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting": importance of §5.1
+//! without splitting, with the distance kept from falling below the node's radius. Three levels of the binary tree
+//! become one, so that the importances of eight children are computed side by side. A walk from the root draws one
+//! source; the probability of any source is the product along its own path, which is stored as bits.
 //!
 //! The walk ends early at a cluster of sources that face nearly one way and are seen under a small angle
-//! ([`WideNode::treat_as_single`]): one of its sources is drawn by power. A finely tessellated emitter then costs a few levels, not all
-//! of them.
+//! ([`WideNode::treat_as_single`]): one of its sources is drawn by power. A finely tessellated emitter then costs a few
+//! levels, not all of them.
 
 use super::bounds::{LightBounds, Power};
 use super::{LightTree, Node, OrientedSource, SaohSplit};
@@ -20,7 +20,8 @@ use std::ops::Range;
 const WIDTH: usize = 8;
 /// Levels of the binary tree in one node.
 const LEVELS: u32 = WIDTH.ilog2();
-/// Below this depth of the binary tree sets are halved by count, so that the path to any of 2³² sources fits into 64 bits.
+/// Below this depth of the binary tree sets are halved by count, so that the path to any of 2³² sources fits into 64
+/// bits.
 const MAX_SAOH_DEPTH: u32 = 31;
 
 /// One number for each child.
@@ -28,12 +29,12 @@ type Lanes = [f32; WIDTH];
 
 /// Largest half angle of a cluster that is treated as one source, in radians …
 const SINGLE_HALF_ANGLE: f32 = 0.2;
-/// … and its largest radius as a fraction of the distance. Distance and cosines vary by a tenth or two over such a cluster, which is little
-/// compared with the variation of visibility and BSDF.
+/// … and its largest radius as a fraction of the distance. Distance and cosines vary by a tenth or two over such a
+/// cluster, which is little compared with the variation of visibility and BSDF.
 const SINGLE_RADIUS: f32 = 0.1;
 
-/// The children of a node, as one array for each number: bounding sphere, cone as cosines and sines, power, and range of sources. Lanes
-/// without a child have no power.
+/// The children of a node, as one array for each number: bounding sphere, cone as cosines and sines, power, and range
+/// of sources. Lanes without a child have no power.
 #[derive(Clone, Debug, Default)]
 #[repr(C, align(64))]
 struct WideNode {
@@ -44,8 +45,8 @@ struct WideNode {
     sin_half_angle: Lanes,
     cos_emission: Lanes,
     power: Lanes,
-    /// Squared distance from `centre` beyond which the child is treated as one source; infinite if its half angle is too large, negative
-    /// if it is one source.
+    /// Squared distance from `centre` beyond which the child is treated as one source; infinite if its half angle is
+    /// too large, negative if it is one source.
     single_distance2: Lanes,
     begin: [u32; WIDTH],
     end: [u32; WIDTH],
@@ -101,8 +102,8 @@ impl WideNode {
         !near
     }
 
-    /// Estimates of the light that arrives from each child at `p`, on a surface with the normal `n` if `FACING`; zero only if none can
-    /// arrive. There are no branches: all lanes are computed at once.
+    /// Estimates of the light that arrives from each child at `p`, on a surface with the normal `n` if `FACING`; zero
+    /// only if none can arrive. There are no branches: all lanes are computed at once.
     #[inline]
     fn importance<const FACING: bool>(&self, p: Vec3, n: Vec3) -> Lanes {
         std::array::from_fn(|k| {
@@ -140,9 +141,9 @@ impl WideNode {
     }
 }
 
-/// Sums of the importances before each child, and of all: the unit interval divided among the children, not normalised. In double precision
-/// sums of eight numbers are as good as exact: no child loses its part to rounding, and the rest of a random number can be used again
-/// at every level.
+/// Sums of the importances before each child, and of all: the unit interval divided among the children, not normalised.
+/// In double precision sums of eight numbers are as good as exact: no child loses its part to rounding, and the rest of
+/// a random number can be used again at every level.
 struct Shares([f64; WIDTH + 1]);
 
 impl Shares {
@@ -212,8 +213,8 @@ struct Widening<'a, P> {
 }
 
 impl<P: Power> Widening<'_, P> {
-    /// Numbers of the binary nodes that are the children of `node` in a tree with nodes of [`WIDTH`] children: those [`LEVELS`] below it,
-    /// and as long as they are fewer, the two halves of the one with the largest cost.
+    /// Numbers of the binary nodes that are the children of `node` in a tree with nodes of [`WIDTH`] children: those
+    /// [`LEVELS`] below it, and as long as they are fewer, the two halves of the one with the largest cost.
     fn children(&self, node: usize) -> Vec<usize> {
         let nodes = &self.binary.nodes;
         let halves = |n: usize| [nodes[n].child as usize, nodes[n].child as usize + 1];
@@ -237,8 +238,8 @@ impl<P: Power> Widening<'_, P> {
         children
     }
 
-    /// Makes the wide nodes below the lane `at` = (node, lane), which is the binary node `node` and is reached by `path`, whose first `bits`
-    /// bits are known.
+    /// Makes the wide nodes below the lane `at` = (node, lane), which is the binary node `node` and is reached by
+    /// `path`, whose first `bits` bits are known.
     fn widen(&mut self, at: (usize, usize), node: usize, path: u64, bits: u32) {
         let binary = &self.binary.nodes[node];
         if binary.is_leaf() {
@@ -279,8 +280,9 @@ impl WideLightTree {
         self.nodes.is_empty()
     }
 
-    /// Draws a source that may light the point `p`, and returns its index and probability. `n` is the unit normal on the side where light is
-    /// received; `None` if light is received from all sides. `None` is returned only by an empty tree.
+    /// Draws a source that may light the point `p`, and returns its index and probability. `n` is the unit normal on
+    /// the side where light is received; `None` if light is received from all sides. `None` is returned only by an
+    /// empty tree.
     pub fn sample(&self, p: Vec3, n: Option<Vec3>, u: f32) -> Option<(u32, Pmf)> {
         let (mut node, mut lane, mut pmf) = (self.nodes.first()?, 0, 1.0);
         let mut u = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON));
@@ -298,7 +300,8 @@ impl WideLightTree {
         Some((self.order[position], Pmf(pmf * self.weights.pmf(&range, position) as f32)))
     }
 
-    /// Probability with which [`WideLightTree::sample`] draws the source with the index `index` for the same `p` and `n`.
+    /// Probability with which [`WideLightTree::sample`] draws the source with the index `index` for the same `p` and
+    /// `n`.
     pub fn pmf(&self, p: Vec3, n: Option<Vec3>, index: u32) -> Pmf {
         let Some(Some(LeafPath { mut path, position })) = self.leaves.get(index as usize).copied() else {
             return Pmf(0.0);
