@@ -14,6 +14,7 @@
 
 use super::cache_points::{CachePoints, FoundLight};
 use crate::bidir::VertexStore;
+use crate::math::cdf::CdfRows;
 use crate::math::hash::HashRng;
 use crate::path::{Iteration, streams};
 use crate::ray::offset::segment;
@@ -40,11 +41,8 @@ pub(super) struct GroupPmf {
     entries: Vec<Entry>,
     /// Entries of each cache point: of `entries` or, with one stage, all vertices.
     count: usize,
-    /// For each cache point and entry the cumulative probability. All zero where no light arrives. Each row is filled up with ones to whole
-    /// blocks.
-    cdf: Vec<Block>,
-    /// For each cache point, the last of each block: where a search begins.
-    ends: Vec<f32>,
+    /// P₂ for each cache point.
+    rows: CdfRows,
     /// For each entry, the cache points of the group that it brings light to: a bit for each.
     seen: Vec<u16>,
     /// For each cache point, the light that it found.
@@ -52,38 +50,12 @@ pub(super) struct GroupPmf {
     ranges: Vec<Range<usize>>,
 }
 
-/// Entries that a search compares at once.
-const BLOCK: usize = 16;
-
-/// A part of a row of probabilities, one line of a cache.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(align(64))]
-struct Block([f32; BLOCK]);
-
-/// The cumulative probabilities of a cache point.
-#[derive(Clone, Copy, Debug)]
-struct Row<'a> {
-    blocks: &'a [Block],
-    ends: &'a [f32],
-}
-
-impl Row<'_> {
-    #[inline]
-    fn cumulative(&self, e: usize) -> f32 {
-        self.blocks[e / BLOCK].0[e % BLOCK]
-    }
-
-    #[inline]
-    fn probability(&self, e: usize) -> f32 {
-        self.cumulative(e) - if e == 0 { 0.0 } else { self.cumulative(e - 1) }
-    }
-
-    /// The number of entries whose cumulative probabilities are at most u.
-    #[inline]
-    fn find(&self, u: f32) -> usize {
-        let b = self.ends.partition_point(|&end| end <= u).min(self.blocks.len() - 1);
-        b * BLOCK + self.blocks[b].0.iter().filter(|&&c| c <= u).count()
-    }
+/// Memory of one thread, to be used again.
+#[derive(Default)]
+struct Scratch {
+    cut: CutScratch,
+    /// For each cache point of a group the weights of all entries.
+    weights: Vec<f32>,
 }
 
 /// A choice among entries.
@@ -106,17 +78,11 @@ pub(super) struct Pmfs {
 }
 
 impl GroupPmf {
-    /// Blocks of a row.
-    fn blocks(&self) -> usize {
-        self.count.div_ceil(BLOCK)
-    }
-
-    /// The probabilities of a cache point, if anything is brought to it.
+    /// Number of a cache point's row of probabilities, if any light arrives there.
     #[inline]
-    fn row(&self, cache: usize) -> Option<Row<'_>> {
-        let (blocks, at) = (self.blocks(), (cache - self.first) * self.blocks());
-        let ends = &self.ends[at..at + blocks];
-        ends.last().is_some_and(|&top| top > 0.0).then(|| Row { blocks: &self.cdf[at..at + blocks], ends })
+    fn row(&self, cache: usize) -> Option<usize> {
+        let row = cache - self.first;
+        (self.rows.total(row) > 0.0).then_some(row)
     }
 
     /// Entry `e`, drawn with the probability `p` among all entries.
@@ -148,25 +114,31 @@ impl GroupPmf {
     }
 
     /// The last stage: the light that every entry brings to every cache point of the group.
-    fn fill(&mut self, caches: &CachePoints, group: &Range<usize>, store: &VertexStore, tracer: &mut Tracer) {
+    fn fill(
+        &mut self,
+        caches: &CachePoints,
+        group: &Range<usize>,
+        store: &VertexStore,
+        tracer: &mut Tracer,
+        weights: &mut Vec<f32>,
+    ) {
         self.first = group.start;
-        let blocks = self.blocks();
-        self.cdf.clear();
-        self.cdf.resize(group.len() * blocks, Block::default());
-        self.ends.clear();
+        let count = self.count;
+        weights.clear();
+        weights.resize(group.len() * count, 0.0);
         self.seen.clear();
-        self.seen.resize(self.count, 0);
+        self.seen.resize(count, 0);
         self.found.clear();
         self.found.resize(group.len(), [0.0; 3]);
-        for e in 0..self.count {
-            self.fill_entry(e, caches, group, store, tracer);
+        for e in 0..count {
+            self.fill_entry(e, caches, group, store, tracer, weights);
         }
-        if self.count > 0 {
-            for (cdf, found) in self.cdf.chunks_exact_mut(blocks).zip(&mut self.found) {
-                accumulate(cdf, self.count);
-                self.ends.extend(cdf.iter().map(|block| block.0[BLOCK - 1]));
-                *found = found.map(|sum| sum / f64::from(store.paths_traced));
-            }
+        self.rows.reset(count, group.len());
+        for c in 0..group.len() {
+            self.rows.push(|e| f64::from(weights[c * count + e]));
+        }
+        if count > 0 {
+            self.found.iter_mut().for_each(|found| *found = found.map(|sum| sum / f64::from(store.paths_traced)));
         }
     }
 
@@ -178,8 +150,8 @@ impl GroupPmf {
         group: &Range<usize>,
         store: &VertexStore,
         tracer: &mut Tracer,
+        weights: &mut [f32],
     ) {
-        let blocks = self.blocks();
         let (points, sides) = (&caches.index.points()[group.clone()], &caches.index.normals()[group.clone()]);
         let entry = self.entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, inv_p1: 1.0 });
         let y = store.vertex(entry.vertex as usize);
@@ -203,24 +175,11 @@ impl GroupPmf {
         let seen_by = seen.clone().fold(0u16, |by, (_, (c, _))| by | 1 << c);
         self.seen[e] = seen_by;
         for (_, &(c, full)) in seen {
-            let weight = caches.pmf_weight(group.start + c, y.place.position(), full);
-            self.cdf[c * blocks + e / BLOCK].0[e % BLOCK] = weight;
+            weights[c * self.count + e] = caches.pmf_weight(group.start + c, y.place.position(), full);
             self.found[c][0] += f64::from(full);
             if caches.leave_one_out_neighbors[group.start + c] & seen_by == 0 {
                 self.found[c][2] += f64::from(full);
             }
-        }
-    }
-}
-
-/// Turns the weights of the first `count` entries into cumulative probabilities, which end in exactly one.
-fn accumulate(blocks: &mut [Block], count: usize) {
-    let sum: f64 = blocks.iter().flat_map(|b| b.0).take(count).map(f64::from).sum();
-    if sum > 0.0 {
-        let mut below = 0.0;
-        for c in blocks.iter_mut().flat_map(|b| &mut b.0) {
-            below += f64::from(*c);
-            *c = (below / sum) as f32;
         }
     }
 }
@@ -241,21 +200,21 @@ impl Pmfs {
             let number = |(g, range): (usize, &Range<usize>)| std::iter::repeat_n(g as u32, range.len());
             self.group_of = caches.groups.iter().enumerate().flat_map(number).collect();
         }
-        let of_group = |memory: &mut CutScratch, (number, (pmf, group)): (usize, (&mut GroupPmf, &Range<usize>))| {
+        let of_group = |scratch: &mut Scratch, (number, (pmf, group)): (usize, (&mut GroupPmf, &Range<usize>))| {
             let mut tracer = iteration.tracer();
             match second_stage {
                 None => pmf.count = store.len(),
                 Some(clusters) => {
                     let mut rng = HashRng::new(iteration.seed, streams::FIRST_STAGE, number as u64, set);
-                    pmf.draw_entries(caches, group, store, clusters, &mut rng, memory);
+                    pmf.draw_entries(caches, group, store, clusters, &mut rng, &mut scratch.cut);
                     pmf.count = pmf.entries.len();
                 }
             }
-            pmf.fill(caches, group, store, &mut tracer);
+            pmf.fill(caches, group, store, &mut tracer, &mut scratch.weights);
             tracer.stats
         };
         let groups = self.groups.par_iter_mut().zip(&caches.groups).enumerate();
-        groups.map_init(CutScratch::default, of_group).reduce(RayStats::default, |mut a, b| {
+        groups.map_init(Scratch::default, of_group).reduce(RayStats::default, |mut a, b| {
             a.merge(&b);
             a
         })
@@ -276,22 +235,23 @@ impl Pmfs {
             return None;
         }
         let n = caches.len().min(3);
-        let mut rows: [Option<Row>; 3] = [None; 3];
+        let mut rows: [Option<(&CdfRows, usize)>; 3] = [None; 3];
         for (row, &cache) in rows.iter_mut().zip(caches) {
-            *row = self.groups[self.group_of[cache] as usize].row(cache);
+            let group = &self.groups[self.group_of[cache] as usize];
+            *row = group.row(cache).map(|row| (&group.rows, row));
         }
         let uniform = 1.0 / entries as f32;
         let share = 1.0 / (n + 1) as f32;
         let chosen = ((u[0] * (n + 1) as f32) as usize).min(n);
         let e = match rows.get(chosen) {
-            Some(Some(row)) if chosen < n => row.find(u[1]),
+            Some(Some((rows, row))) if chosen < n => rows.find(*row, u[1]).0,
             // A cache point that no light vertex reaches draws uniformly, as the last component of the mixture does.
             _ => (u[1] * entries as f32) as usize,
         }
         .min(entries - 1);
         let mut p = share * uniform;
         for row in &rows[..n] {
-            p += share * row.map_or(uniform, |row| row.probability(e));
+            p += share * row.map_or(uniform, |(rows, row)| rows.probability(row, e));
         }
         Some(group.selection(e, p))
     }
@@ -315,8 +275,8 @@ impl Pmfs {
     pub fn draw_at(&self, cache: usize, u: f32) -> Option<Selection> {
         let group = self.group(cache)?;
         let row = group.row(cache)?;
-        let e = row.find(u).min(group.count - 1);
-        Some(group.selection(e, row.probability(e)))
+        let (e, _) = group.rows.find(row, u);
+        Some(group.selection(e, group.rows.probability(row, e)))
     }
 
     /// Draws one of all entries of the cache point's group; `None` if there are none.
@@ -324,37 +284,5 @@ impl Pmfs {
         let group = self.group(cache).filter(|group| group.count > 0)?;
         let e = ((u * group.count as f32) as usize).min(group.count - 1);
         Some(group.selection(e, 1.0 / group.count as f32))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_search_by_blocks_finds_what_a_plain_one_finds() {
-        let mut rng = HashRng::new(9, 8, 7, 6);
-        for count in [1usize, 2, 15, 16, 17, 32, 200, 333] {
-            let mut blocks = vec![Block::default(); count.div_ceil(BLOCK)];
-            for e in 0..count {
-                let [u, v, ..] = rng.next_4();
-                // Many entries bring nothing.
-                blocks[e / BLOCK].0[e % BLOCK] = if u < 0.5 { 0.0 } else { v };
-            }
-            blocks[0].0[0] = 0.5;
-            let brought: Vec<f32> = blocks.iter().flat_map(|b| b.0).take(count).collect();
-            let sum: f64 = brought.iter().map(|&b| f64::from(b)).sum();
-            accumulate(&mut blocks, count);
-            let ends: Vec<f32> = blocks.iter().map(|b| b.0[BLOCK - 1]).collect();
-            let row = Row { blocks: &blocks, ends: &ends };
-            let plain: Vec<f32> = (0..count).map(|e| row.cumulative(e)).collect();
-            assert_eq!(plain[count - 1], 1.0);
-            for _ in 0..200 {
-                let u = rng.next_f32();
-                let e = row.find(u);
-                assert_eq!(e, plain.partition_point(|&c| c <= u));
-                assert!((f64::from(row.probability(e)) - f64::from(brought[e]) / sum).abs() < 1e-6 && brought[e] > 0.0);
-            }
-        }
     }
 }
