@@ -7,10 +7,10 @@ use crate::math::warp::{SPHERE_PDF, square_to_disk, square_to_sphere};
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec3};
 use std::f32::consts::PI;
 
-/// What surrounds the scene. Directions are unit vectors in the world, from the scene outwards.
+/// Radiance around the scene. Directions are unit vectors in the world, from the scene outwards.
 #[derive(Clone, Debug)]
 pub enum Environment {
-    /// The same radiance from everywhere.
+    /// Constant radiance.
     Constant(Rgb),
     /// A picture.
     Map(Box<EnvMap>),

@@ -34,7 +34,7 @@ pub use sample::{DirectSample, EmissionSample, EmitterVertex};
 pub use sunsky::{SunSky, SunSkyParams};
 pub use triangle::{RadianceTexture, TexturedEmission, TriangleEmission, TriangleLight};
 
-/// What a light or camera cannot be built from.
+/// An error in the description of a light or camera.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EmitError {
     /// A transform that flattens space, or is not finite.
@@ -43,11 +43,11 @@ pub enum EmitError {
     /// A number outside of its range.
     #[error("{name} must be {expected}, not {value}")]
     Range {
-        /// Which number.
+        /// Name of the number.
         name: &'static str,
-        /// What it should be.
+        /// The expected value or range.
         expected: &'static str,
-        /// What it is.
+        /// The given value.
         value: f64,
     },
 }

@@ -20,10 +20,10 @@ pub trait RadianceTexture: std::fmt::Debug + Send + Sync {
     fn mean(&self) -> Rgb;
 }
 
-/// What a triangle emits from its front.
+/// Radiance emitted by the front of a triangle.
 #[derive(Clone, Debug)]
 pub enum TriangleEmission {
-    /// The same radiance everywhere.
+    /// Constant radiance.
     Constant(Rgb),
     /// Looked up.
     Textured(Box<TexturedEmission>),

@@ -33,8 +33,8 @@ const SEQUENCE_BITS: u32 = 16;
 /// Index bits that one table entry stands for.
 const CHUNK: u32 = 4;
 const CHUNKS: usize = (SEQUENCE_BITS / CHUNK) as usize;
-/// What tells the dimensions of a set apart before they are scrambled (sobol_burley's constants), for both sets of a
-/// vertex.
+/// Keys that make the dimensions of a set differ before they are scrambled (sobol_burley's constants), for both sets of
+/// a vertex.
 const LANE_KEYS: [u32; LANES] = [
     0x912f_69ba,
     0x174f_18ab,
@@ -70,7 +70,7 @@ pub struct PathSampler {
     /// The shuffled, reversed index.
     shuffled_rev: u32,
     scramble: u32,
-    /// Of the numbers without Sobol points; unique to the path.
+    /// Key of the hashed numbers; unique to the path.
     key: u64,
     /// The vertex whose numbers are at hand.
     current: u32,

@@ -52,7 +52,7 @@ struct Stretch {
 
 /// Cuts curves where they become wide ([`WIDE`]) or narrow.
 fn stretches(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<Stretch> {
-    const NOBODY: usize = usize::MAX;
+    const UNNUMBERED: usize = usize::MAX;
     let mut on_curve = vec![false; grid.len()];
     for &i in curve {
         on_curve[i] = true;
@@ -60,10 +60,10 @@ fn stretches(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<Stretch>
     let is_wide = |i: usize| squared[i] >= WIDE;
     let steps = grid.steps();
     let near = |i: usize| steps.iter().map(move |s| i.wrapping_add_signed(*s));
-    let mut number = vec![NOBODY; grid.len()];
+    let mut number = vec![UNNUMBERED; grid.len()];
     let mut found: Vec<Stretch> = Vec::new();
     for &start in curve {
-        if number[start] != NOBODY {
+        if number[start] != UNNUMBERED {
             continue;
         }
         let (wide, mut cubes, mut done) = (is_wide(start), vec![start], 0);
@@ -71,7 +71,7 @@ fn stretches(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<Stretch>
         while let Some(&i) = cubes.get(done) {
             done += 1;
             for n in near(i).filter(|&n| on_curve[n] && is_wide(n) == wide) {
-                if number[n] == NOBODY {
+                if number[n] == UNNUMBERED {
                     number[n] = found.len();
                     cubes.push(n);
                 }
@@ -95,7 +95,7 @@ fn worthwhile(grid: &VoxelGrid, squared: &[u32], curve: &[usize]) -> Vec<usize> 
     if !stretches.iter().any(|s| s.wide) {
         return curve.to_vec();
     }
-    // What is joined has the same root.
+    // Joined nodes have the same root.
     let mut parent: Vec<usize> = (0..stretches.len()).collect();
     let root = |parent: &[usize], mut k: usize| {
         while parent[k] != k {
@@ -165,9 +165,9 @@ fn survivors(grid: &VoxelGrid, squared: &[u32], order: &[usize]) -> Vec<usize> {
 /// Gives every cube of `curve` to the node of `stay` that is nearest along the curves (steps count their length; ties
 /// go to the smaller number), and joins the nodes whose cubes touch.
 fn contracted(grid: &VoxelGrid, curve: &[usize], stay: &[usize]) -> Vec<[u32; 2]> {
-    const NOBODY: (u32, u32) = (u32::MAX, u32::MAX);
+    const NO_OWNER: (u32, u32) = (u32::MAX, u32::MAX);
     // Distance and owner of cubes on curves.
-    let mut owner = vec![NOBODY; grid.len()];
+    let mut owner = vec![NO_OWNER; grid.len()];
     let mut on_curve = vec![false; grid.len()];
     for &i in curve {
         on_curve[i] = true;

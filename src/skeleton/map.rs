@@ -3,7 +3,7 @@
 //!
 //! Distances count steps to the 26 neighbours with 3 over a face, 4 over an edge and 5 over a corner (Borgefors 1986),
 //! close to three times the Euclidean length. Whole numbers make ties exact; they go to the node with the smaller
-//! number. Since solid surfaces are closed against steps over corners, nobody gets a node on the other side of a wall;
+//! number. Since solid surfaces are closed against steps over corners, no cube gets a node on the other side of a wall;
 //! only pockets without any node, which the filter leaves, take that of their neighbours.
 
 use super::voxels::{OFFSETS, VoxelGrid};

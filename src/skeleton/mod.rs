@@ -1,6 +1,6 @@
 //! The skeleton of empty space: few nodes in the middle of rooms and passages, and a map from any point to its node.
 //!
-//! What is seen from a node is much like what is seen from the surfaces around it, so that knowledge about visibility
+//! Visibility from a node is much like visibility from the surfaces around it, so that knowledge about visibility
 //! can be kept at nodes and shared by all points that belong to them (Noël and Biri 2015). Steps of the construction:
 //! [`voxels`] makes the scene solid cubes, [`reachable_space`] fills parts that no path reaches, [`distance`] computes
 //! each empty cube's distance to solid ones, [`thinning`] reduces empty space to curves, [`graph`] selects few nodes on

@@ -34,7 +34,7 @@ pub type Place = (Vec3, Vec3);
 pub struct Places {
     /// The camera, and the lights that are in the scene.
     pub ends: Vec<Place>,
-    /// What the camera sees first.
+    /// First hits of camera rays.
     pub seen: Vec<Place>,
 }
 
@@ -69,7 +69,7 @@ pub fn region(bounds: (Vec3, Vec3), places: &Places) -> (Vec3, Vec3) {
     for axis in 0..3 {
         let mut sorted: Vec<f32> = places.seen.iter().map(|(p, _)| p[axis]).collect();
         sorted.sort_by(f32::total_cmp);
-        // What is seen through a window can be anywhere.
+        // Points seen through a window can be anywhere.
         let few = (sorted.len() as f32 * OUTLIERS) as usize;
         let (Some(first), Some(last)) = (sorted.get(few), sorted.iter().rev().nth(few)) else { return bounds };
         (core.0[axis], core.1[axis]) = (*first, *last);

@@ -1,4 +1,4 @@
-//! What a cube's neighbourhood says: may the cube go without changing the topology, and does it hold two parts
+//! Tests of a cube's neighbourhood: may the cube be removed without changing the topology, and does it hold two parts
 //! together?
 //!
 //! An object whose cubes touch over faces, edges or corners (26 neighbours), in a background whose cubes touch over

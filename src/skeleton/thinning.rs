@@ -58,7 +58,7 @@ fn thin(grid: &VoxelGrid, object: &mut [bool], layers: &[u16], keeps: impl Fn(us
     kept
 }
 
-/// What is around a cube.
+/// Neighbourhood of a cube.
 struct Around {
     steps: [isize; 26],
     width: usize,
@@ -159,7 +159,7 @@ mod tests {
         squared.iter().map(|&d| f64::from(d).sqrt() as u16).collect()
     }
 
-    /// What thinning must leave alone: pieces of the object (26 neighbours), pieces of the background (6), Euler
+    /// Invariants of thinning: pieces of the object (26 neighbours), pieces of the background (6), Euler
     /// characteristic.
     fn topology(grid: &VoxelGrid, object: &[bool]) -> (usize, usize, i64) {
         let count = |of: bool, axes: i64| {

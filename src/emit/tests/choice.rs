@@ -118,7 +118,7 @@ fn lights_without_probability_are_dark() {
     assert!(dark > 10_000, "{dark}");
 }
 
-/// What the tree is for: less variance than choice by power among many lights spread over a large room.
+/// The tree has less variance than sampling by power among many lights spread over a large room.
 #[test]
 fn the_tree_follows_the_distance() {
     let lights: Vec<Light> = (0..100)

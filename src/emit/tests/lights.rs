@@ -288,7 +288,7 @@ fn emission_carries_the_power_and_agrees_with_its_densities() {
     }
 }
 
-/// The same density either way round: the area density of the vertex after the light, times the light vertex's, is the
+/// Densities agree in both orders: the area density of the vertex after the light, times the light vertex's, is the
 /// Jacobian of the same pair of points.
 #[test]
 fn infinite_lights_follow_the_vertex_conventions() {
