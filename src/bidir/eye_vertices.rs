@@ -5,7 +5,7 @@ use crate::math::sampler::PathSampler;
 use crate::math::{Rgb, Vec3};
 use crate::path::{Edge, Place, ScatterSampler, StoredPlace, Vertex, WalkHooks, WalkRules, WalkStart, streams, walk};
 use crate::ray::{RayKind, RayStats, Tracer};
-use crate::shade::{BsdfPool, KeptBsdf, Transport};
+use crate::shade::{BsdfPool, StoredBsdf, Transport};
 use rayon::prelude::*;
 
 /// A connectable surface vertex of an eye sub-path.
@@ -22,7 +22,7 @@ pub struct EyeSubpathVertex {
     /// Unit direction towards the vertex before.
     pub wo: Vec3,
     /// The BSDF, in the pool of all vertices.
-    pub bsdf: KeptBsdf,
+    pub bsdf: StoredBsdf,
 }
 
 impl EyeSubpathVertex {
@@ -50,7 +50,7 @@ impl WalkHooks for EyeSubpathVertices {
             && let Place::Surface { point, .. } = v.place
         {
             let side = v.place.stored().side_normal(v.wo);
-            let bsdf = self.bsdfs.keep(v.scatter.bsdf());
+            let bsdf = self.bsdfs.store(v.scatter.bsdf());
             let (p, error, ng) = (point.p, point.error, point.ng);
             self.vertices.push(EyeSubpathVertex { p, error, ng, side, wo: v.wo, bsdf });
         }
@@ -86,7 +86,7 @@ impl WarmUp<'_> {
             stats.merge(&s);
             let offset = all.bsdfs.append(&piece.bsdfs);
             all.vertices
-                .extend(piece.vertices.into_iter().map(|v| EyeSubpathVertex { bsdf: v.bsdf.moved(offset), ..v }));
+                .extend(piece.vertices.into_iter().map(|v| EyeSubpathVertex { bsdf: v.bsdf.offset_by(offset), ..v }));
         }
         (all, stats)
     }

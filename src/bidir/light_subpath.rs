@@ -197,7 +197,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
             throughput: vertex.throughput,
             survival: self.rules.mis.light_limits.survival(vertex.index, &vertex.scatter),
             s: vertex.index + 1,
-            bsdf: self.out.bsdfs.keep(bsdf),
+            bsdf: self.out.bsdfs.store(bsdf),
         });
     }
 }

@@ -5,7 +5,7 @@ use super::strategy::Candidate;
 use super::vertex::LightVertex;
 use crate::math::Vec3;
 use crate::mis::{EmitterFactors, VertexPdfs};
-use crate::shade::{BsdfPool, BsdfRef};
+use crate::shade::{BsdfPool, BsdfView};
 use crate::spatial::light_tree::WeightedPoint;
 use crate::spatial::{VplTree, morton};
 use rayon::prelude::*;
@@ -125,7 +125,7 @@ impl VertexStore {
 
     /// The BSDF of a vertex, by its place in the order.
     #[inline]
-    pub fn bsdf(&self, v: usize) -> BsdfRef<'_> {
+    pub fn bsdf(&self, v: usize) -> BsdfView<'_> {
         let StoredVertex { vertex, chunk, .. } = &self.vertices[v];
         vertex.bsdf_in(&self.chunks[usize::from(*chunk)].bsdfs)
     }
@@ -164,7 +164,7 @@ impl StoreChunk {
         self.pdfs.extend_from_slice(path.pdfs.all());
         let bsdfs = &mut self.bsdfs;
         self.vertices.extend(path.vertices.iter().map(|v| StoredVertex {
-            vertex: LightVertex { bsdf: bsdfs.keep_from(&v.bsdf, &path.bsdfs), ..*v },
+            vertex: LightVertex { bsdf: bsdfs.store_from(&v.bsdf, &path.bsdfs), ..*v },
             number,
             first_pdf,
             next_event: path.emitter.next_event,

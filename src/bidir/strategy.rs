@@ -13,7 +13,7 @@ use crate::path::{Iteration, Origin, StoredPlace, Vertex};
 use crate::prepared::PreparedScene;
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{RayStats, Tracer};
-use crate::shade::{BsdfRef, Transport};
+use crate::shade::{BsdfView, Transport};
 
 /// Where the light sub-paths of an iteration come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ pub struct Candidate<'a, L> {
     /// Its last vertex, y_{s−1}.
     pub vertex: &'a LightVertex,
     /// The BSDF of that vertex.
-    pub bsdf: BsdfRef<'a>,
+    pub bsdf: BsdfView<'a>,
     /// Densities of its s vertices.
     pub pdfs: &'a [VertexPdfs],
     /// c_0 and c_1 of paths that begin with it.

@@ -3,7 +3,7 @@
 use crate::math::{Rgb, Vec3};
 use crate::mis::ResamplingTarget;
 use crate::path::StoredPlace;
-use crate::shade::{BsdfPool, BsdfRef, KeptBsdf, Transport};
+use crate::shade::{BsdfPool, BsdfView, StoredBsdf, Transport};
 
 /// A vertex y_{s−1} of a light sub-path, s ≥ 2. There are many of them: they hold only what a connection reads.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +19,7 @@ pub struct LightVertex {
     /// s: the vertices of the sub-path up to this one.
     pub s: u32,
     /// The BSDF, resolved for `wo`; its lobes are in the pool of the vertex's sub-path or store.
-    pub bsdf: KeptBsdf,
+    pub bsdf: StoredBsdf,
 }
 
 impl LightVertex {
@@ -31,7 +31,7 @@ impl LightVertex {
 
     /// The vertex's BSDF, which `pool` holds.
     #[inline]
-    pub fn bsdf_in<'a>(&self, pool: &'a BsdfPool) -> BsdfRef<'a> {
+    pub fn bsdf_in<'a>(&self, pool: &'a BsdfPool) -> BsdfView<'a> {
         match self.place {
             StoredPlace::Surface { ng, .. } => pool.get(&self.bsdf, ng),
             StoredPlace::Medium(medium) => match medium {},
@@ -40,7 +40,7 @@ impl LightVertex {
 
     /// q̂₂/p and q̂₁/p at a surface at `p` on the side of the unit normal `n`, visibility taken for granted. `bsdf` is the vertex's BSDF.
     #[inline]
-    pub fn target_over_pdf(&self, bsdf: &BsdfRef, p: Vec3, n: Vec3) -> ResamplingTarget {
+    pub fn target_over_pdf(&self, bsdf: &BsdfView, p: Vec3, n: Vec3) -> ResamplingTarget {
         let Some((towards, jacobian)) = direction_to(self.place.position(), p, n) else {
             return ResamplingTarget::default();
         };

@@ -4,7 +4,7 @@ use crate::math::measure::area_jacobian;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::ray::Hit;
 use crate::ray::offset::SegmentEnd;
-use crate::shade::{Bsdf, BsdfRef, BsdfSample, MediumPoint, Phase, SurfacePoint, Transport};
+use crate::shade::{Bsdf, BsdfSample, BsdfView, MediumPoint, Phase, SurfacePoint, Transport};
 
 /// How a vertex was reached.
 #[derive(Clone, Copy, Debug)]
@@ -188,7 +188,7 @@ macro_rules! scattering {
     )* };
 }
 
-scattering!(Bsdf, BsdfRef<'_>);
+scattering!(Bsdf, BsdfView<'_>);
 
 /// The scattering function of a vertex that a walk has just made.
 #[derive(Clone, Copy, Debug)]

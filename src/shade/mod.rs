@@ -13,7 +13,7 @@ pub mod medium;
 pub mod point;
 pub mod texture;
 
-pub use bsdf::{Bsdf, BsdfPool, BsdfRef, BsdfSample, Features, KeptBsdf, Material, MaterialSet};
+pub use bsdf::{Bsdf, BsdfPool, BsdfSample, BsdfView, Features, Material, MaterialSet, StoredBsdf};
 pub use medium::{MediumPoint, Phase};
 pub use point::SurfacePoint;
 pub use texture::{ColorTexture, ScalarTexture, Texture, TextureSet};

@@ -14,7 +14,7 @@ use crate::mis::factors::NormalizationEstimate;
 use crate::path::StoredPlace;
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{PACKET, RayStats};
-use crate::shade::{BsdfPool, KeptBsdf, Transport};
+use crate::shade::{BsdfPool, StoredBsdf, Transport};
 use crate::spatial::NearestPoints;
 use crate::spatial::light_tree::ReceiverBounds;
 use crate::spatial::nearest::MAX_NEIGHBORS;
@@ -64,7 +64,7 @@ pub(super) struct CachePoints {
 /// BSDFs of cache points, as the eye sub-paths that made them see them.
 #[derive(Debug)]
 struct CacheBsdfs {
-    each: Vec<(Vec3, KeptBsdf)>,
+    each: Vec<(Vec3, StoredBsdf)>,
     pool: BsdfPool,
 }
 
@@ -281,7 +281,7 @@ mod tests {
             .map(|_| {
                 let [x, y, z, _] = rng.next_4();
                 let (p, n) = (Vec3::new(x, y, z), Vec3::Z);
-                let bsdf = pool.keep(&Bsdf::empty(&SurfacePoint::default()));
+                let bsdf = pool.store(&Bsdf::empty(&SurfacePoint::default()));
                 EyeSubpathVertex { p, side: n, error: 0.0, ng: n, wo: n, bsdf }
             })
             .collect();

@@ -9,7 +9,7 @@ impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     #[inline]
     pub fn is_black(&self) -> bool {
         match &self.scattering {
-            Scattering::Matt(lambert) => lambert.reflectance.is_black(),
+            Scattering::Lambertian(lambert) => lambert.reflectance.is_black(),
             Scattering::Lobes { .. } => self.leaves.is_empty(),
         }
     }

@@ -99,7 +99,7 @@ impl Material {
             // By the bit of the sign: which side is seen is hard to guess, so there is no branch.
             let cos = wo.dot(point.frame.n);
             let Side { reflectance, turn } = sides[(cos.to_bits() >> 31) as usize];
-            bsdf.begin(point, Scattering::Matt(Lambert { n: point.frame.n * turn, reflectance }));
+            bsdf.begin(point, Scattering::Lambertian(Lambert { n: point.frame.n * turn, reflectance }));
             return;
         }
         self.resolve_general(bsdf, point, wo);
@@ -122,7 +122,7 @@ impl Material {
             if let Node::Diffuse { reflectance } = node
                 && !behind
             {
-                bsdf.begin(point, Scattering::Matt(Lambert { n: frame.n, reflectance: reflectance.eval(point) }));
+                bsdf.begin(point, Scattering::Lambertian(Lambert { n: frame.n, reflectance: reflectance.eval(point) }));
                 return;
             }
             only_side = Some(usize::from(behind));

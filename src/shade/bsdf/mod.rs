@@ -8,7 +8,7 @@ mod conductor;
 mod dielectric;
 mod diffuse;
 mod facts;
-mod kept;
+mod bsdf_pool;
 mod link;
 mod lobe;
 mod material;
@@ -24,7 +24,7 @@ mod ward;
 #[cfg(test)]
 mod tests;
 
-pub use kept::{BsdfPool, BsdfRef, KeptBsdf};
+pub use bsdf_pool::{BsdfPool, BsdfView, StoredBsdf};
 pub use material::{Features, Material, MaterialSet};
 
 use super::{SurfacePoint, Transport};
@@ -82,7 +82,7 @@ pub struct Leaf {
 /// traced from the other end may find it turned differently: there the adjoint can be positive where the density is zero. All
 /// densities are still functions of the two directions alone, so combinations of techniques stay consistent.
 ///
-/// `L` and `K` hold the lobes and the frames: [`Bsdf`] has room for any material, [`BsdfRef`] borrows what a [`BsdfPool`] keeps.
+/// `L` and `K` hold the lobes and the frames: [`Bsdf`] has room for any material, [`BsdfView`] borrows what a [`BsdfPool`] keeps.
 #[derive(Clone, Debug)]
 pub struct BsdfOf<L, K> {
     ng: Vec3,
@@ -99,7 +99,7 @@ pub type Bsdf = BsdfOf<ArrayVec<Leaf, MAX_LEAVES>, ArrayVec<Link, MAX_LINKS>>;
 enum Scattering {
     /// The single Lambertian lobe of most surfaces, for which everything else is short-circuited: there are no leaves and nothing else
     /// is written. (Reading in one piece what has just been written in several stalls processors.)
-    Matt(Lambert),
+    Lambertian(Lambert),
     /// By `leaves`.
     Lobes {
         /// Shading frame.
@@ -172,7 +172,7 @@ impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     #[inline]
     pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
         match &self.scattering {
-            Scattering::Matt(lambert) => {
+            Scattering::Lambertian(lambert) => {
                 let Some((cos_o, cos_i)) = lambert.cosines(wo, wi) else {
                     return (Rgb::BLACK, SolidAnglePdf(0.0));
                 };
@@ -217,7 +217,7 @@ impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> SolidAnglePdf {
         match &self.scattering {
-            Scattering::Matt(lambert) => {
+            Scattering::Lambertian(lambert) => {
                 SolidAnglePdf(lambert.cosines(wo, wi).map_or(0.0, |(_, cos_i)| cos_i * std::f32::consts::FRAC_1_PI))
             }
             Scattering::Lobes { frame, pick_scale } => {
@@ -231,7 +231,7 @@ impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     #[inline]
     pub fn pdf_both(&self, wo: Vec3, wi: Vec3, _mode: Transport) -> (SolidAnglePdf, SolidAnglePdf) {
         match &self.scattering {
-            Scattering::Matt(lambert) => {
+            Scattering::Lambertian(lambert) => {
                 let (cos_o, cos_i) = lambert.cosines(wo, wi).unwrap_or((0.0, 0.0));
                 let scale = std::f32::consts::FRAC_1_PI;
                 (SolidAnglePdf(cos_i * scale), SolidAnglePdf(cos_o * scale))
@@ -266,7 +266,7 @@ impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     #[inline]
     pub fn sample(&self, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
         match &self.scattering {
-            Scattering::Matt(lambert) => self.smooth_sample(wo, lambert.sample_direction(u), 1.0, mode),
+            Scattering::Lambertian(lambert) => self.smooth_sample(wo, lambert.sample_direction(u), 1.0, mode),
             Scattering::Lobes { frame, pick_scale } => self.sample_general((frame, pick_scale), wo, u, mode),
         }
     }
@@ -381,7 +381,7 @@ impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     /// whichever side the point is reached.
     #[inline]
     pub fn albedo(&self) -> Rgb {
-        if let Scattering::Matt(lambert) = &self.scattering {
+        if let Scattering::Lambertian(lambert) = &self.scattering {
             return lambert.reflectance;
         }
         let seen =
@@ -393,14 +393,14 @@ impl<L: Deref<Target = [Leaf]>, K: Deref<Target = [Link]>> BsdfOf<L, K> {
     /// It scatters as a matt surface does, and in no other way.
     #[inline]
     pub fn is_lambertian(&self) -> bool {
-        matches!(self.scattering, Scattering::Matt(_))
+        matches!(self.scattering, Scattering::Lambertian(_))
     }
 
     /// True if a connection to this point can carry light: some lobe is not a delta.
     #[inline]
     pub fn connectable(&self) -> bool {
         match &self.scattering {
-            Scattering::Matt(lambert) => !lambert.reflectance.is_black(),
+            Scattering::Lambertian(lambert) => !lambert.reflectance.is_black(),
             Scattering::Lobes { .. } => self.leaves.iter().any(|leaf| leaf.lobe.is_smooth()),
         }
     }

@@ -388,21 +388,21 @@ fn nothing_is_ever_non_finite() {
 
 #[test]
 fn what_a_pool_keeps_is_the_same() {
-    let (mut first, mut second, mut kept) = (BsdfPool::default(), BsdfPool::default(), vec![]);
+    let (mut first, mut second, mut stored) = (BsdfPool::default(), BsdfPool::default(), vec![]);
     let p = point(Vec3::new(0.2, 0.1, 1.0), Vec3::Z);
     for (_, material) in ZOO.all() {
         for (a, b) in pairs(material, &p, 77) {
             let bsdf = material.resolve(&p, a);
-            kept.push((second.keep(&bsdf), bsdf, a, b));
+            stored.push((second.store(&bsdf), bsdf, a, b));
         }
     }
     // Something is there already when the second goes into the first.
-    let before = first.keep(&kept[kept.len() - 1].1);
-    let moved = first.append(&second);
+    let before = first.store(&stored[stored.len() - 1].1);
+    let offset = first.append(&second);
     let mut third = BsdfPool::default();
-    for (kept, bsdf, a, b) in &kept {
-        let copied = third.keep_from(kept, &second);
-        for found in [first.get(&kept.moved(moved), p.ng), second.get(kept, p.ng), third.get(&copied, p.ng)] {
+    for (stored, bsdf, a, b) in &stored {
+        let copied = third.store_from(stored, &second);
+        for found in [first.get(&stored.offset_by(offset), p.ng), second.get(stored, p.ng), third.get(&copied, p.ng)] {
             for mode in [Transport::Radiance, Transport::Importance] {
                 assert_eq!(found.eval_and_pdf(*a, *b, mode), bsdf.eval_and_pdf(*a, *b, mode));
             }
@@ -410,7 +410,7 @@ fn what_a_pool_keeps_is_the_same() {
             assert_eq!(found.connectable(), bsdf.connectable());
         }
     }
-    let (_, last, a, b) = &kept[kept.len() - 1];
+    let (_, last, a, b) = &stored[stored.len() - 1];
     let mode = Transport::Radiance;
     assert_eq!(first.get(&before, p.ng).eval_and_pdf(*a, *b, mode), last.eval_and_pdf(*a, *b, mode));
 }
