@@ -31,7 +31,7 @@ impl LightVertex {
 
     /// The vertex's BSDF, which `pool` holds.
     #[inline]
-    pub fn bsdf_in<'a>(&self, pool: &'a BsdfPool) -> BsdfView<'a> {
+    pub fn bsdf_in<'a>(&'a self, pool: &'a BsdfPool) -> BsdfView<'a> {
         match self.place {
             StoredPlace::Surface { ng, .. } => pool.get(&self.bsdf, ng),
             StoredPlace::Medium(medium) => match medium {},

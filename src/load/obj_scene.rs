@@ -10,8 +10,9 @@ use super::{LoadOptions, framing, ply};
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, Source, nearest};
 use crate::scene::{
-    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, EmitterDesc, EmitterKind, MeshId, ScalarDesc, SceneDesc,
-    ShapeDesc, Span, TextureDesc, TextureFilter, TextureId, WrapMode,
+    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, ComplexIor, ConductorParams, DielectricParams, DiffuseParams,
+    EmitterDesc, EmitterKind, MeshId, PhongParams, ScalarDesc, SceneDesc, ShapeDesc, Span, TextureDesc, TextureFilter,
+    TextureId, WrapMode,
 };
 use glam::DMat4;
 use std::collections::HashMap;
@@ -186,7 +187,7 @@ impl Model {
     }
 
     fn grey(&mut self) -> BsdfId {
-        let inner = self.bsdf(None, BsdfKind::Diffuse { reflectance: ColorDesc::Constant(Rgb::grey(0.5)) }, None);
+        let inner = self.bsdf(None, DiffuseParams { reflectance: ColorDesc::Constant(Rgb::grey(0.5)) }.into(), None);
         self.bsdf(None, BsdfKind::TwoSided { front: inner, back: inner }, None)
     }
 
@@ -234,12 +235,12 @@ impl Model {
         {
             // Black stands for "not filled in" in what many exporters write.
             let tint = mtl.transmission.filter(|t| !t.is_black()).unwrap_or(Rgb::WHITE);
-            let kind = BsdfKind::Dielectric {
+            let glass = DielectricParams {
                 eta: mtl.ior.filter(|i| *i > 1.0).unwrap_or(GLASS),
                 specular_reflectance: ColorDesc::Constant(Rgb::WHITE),
                 specular_transmittance: ColorDesc::Constant(tint.map(|v| v.clamp(0.0, 1.0))),
             };
-            return (self.bsdf(name, kind, span), emission);
+            return (self.bsdf(name, glass.into(), span), emission);
         }
         let diffuse = self.color(mtl.map_diffuse.as_ref(), mtl.diffuse.unwrap_or(Rgb::grey(0.5)), folder, span.clone());
         let shininess = mtl.shininess.unwrap_or(0.0);
@@ -248,15 +249,12 @@ impl Model {
         let kind = if mirror {
             let tint =
                 if specular.is_black() { diffuse } else { ColorDesc::Constant(specular.map(|v| v.clamp(0.0, 1.0))) };
-            BsdfKind::Conductor {
-                eta: ColorDesc::Constant(Rgb::BLACK),
-                k: ColorDesc::Constant(Rgb::WHITE),
-                specular_reflectance: tint,
-            }
+            let ior = ComplexIor { eta: ColorDesc::Constant(Rgb::BLACK), k: ColorDesc::Constant(Rgb::WHITE) };
+            ConductorParams { ior, specular_reflectance: tint }.into()
         } else if shininess > 1.0 && (!specular.is_black() || mtl.map_specular.is_some()) {
             self.glossy(mtl, diffuse, specular, shininess, folder, span.clone())
         } else {
-            BsdfKind::Diffuse { reflectance: clamped(diffuse) }
+            DiffuseParams { reflectance: clamped(diffuse) }.into()
         };
         let inner = self.bsdf(name, kind, span.clone());
         let mut outer = self.bsdf(name, BsdfKind::TwoSided { front: inner, back: inner }, span.clone());
@@ -291,11 +289,12 @@ impl Model {
             ColorDesc::Constant(c) => ColorDesc::Constant(c * scale),
             texture => texture,
         };
-        BsdfKind::Phong {
+        let highlight = PhongParams {
             exponent: ScalarDesc::Constant(exponent),
             specular_reflectance: scaled(specular),
             diffuse_reflectance: scaled(diffuse),
-        }
+        };
+        highlight.into()
     }
 
     fn color(&mut self, map: Option<&Map>, constant: Rgb, folder: &Path, span: Option<Span>) -> ColorDesc {

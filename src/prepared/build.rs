@@ -8,8 +8,8 @@ use crate::emit::{
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 use crate::ray::{Backend, Geometry, Instance, MeshBuffers, QueryError, VertexBuffer};
 use crate::scene::{
-    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, Diagnostic, Diagnostics, EmitterDesc, EmitterKind, ImageDesc,
-    MeshDesc, ScalarDesc, SceneDesc, ShapeDesc,
+    AreaEmission, BsdfId, ColorDesc, Diagnostic, Diagnostics, EmitterDesc, EmitterKind, ImageDesc, MeshDesc, SceneDesc,
+    ShapeDesc,
 };
 use crate::shade::{ColorTexture, MaterialSet, SurfacePoint, TextureSet};
 use glam::{Affine3A, DMat3, DMat4, Mat3A};
@@ -75,9 +75,7 @@ impl PreparedScene {
         }
 
         let centre = centre(&desc);
-        let mut placer =
-            Placer { meshes: std::mem::take(&mut desc.meshes), uses: vec![], oriented: vec![], parts: vec![] };
-        placer.oriented = (0..desc.bsdfs.len()).map(|i| is_oriented(&desc.bsdfs, BsdfId(i as u32), 0)).collect();
+        let mut placer = Placer { meshes: std::mem::take(&mut desc.meshes), uses: vec![], parts: vec![] };
         placer.count_uses(&desc);
         let mut geometry = Geometry::default();
         let to_origin = DMat4::from_translation(-centre);
@@ -243,8 +241,6 @@ struct Part {
 struct Placer {
     meshes: Vec<MeshDesc>,
     uses: Vec<u32>,
-    /// For each material: whether the direction of dp/du matters to it.
-    oriented: Vec<bool>,
     parts: Vec<Part>,
 }
 
@@ -270,15 +266,14 @@ impl Placer {
         };
         let material = shape.bsdf;
         let wants = materials.get(material).features();
-        let tangents = material.is_some_and(|m| self.oriented[m.index()]);
         let emission_textured = shape.emission.as_ref().is_some_and(|e| matches!(e.radiance, ColorDesc::Texture(_)));
         self.parts.push(Part {
             mesh,
             to_place,
             flip: shape.flip_normals,
             material,
-            wants_tangents: tangents,
-            wants_uvs: wants.textured || tangents || emission_textured,
+            wants_tangents: wants.oriented,
+            wants_uvs: wants.textured || wants.oriented || emission_textured,
             wants_colors: wants.textured,
         });
     }
@@ -433,28 +428,6 @@ fn surroundings(kind: &EmitterKind, images: &[ImageDesc]) -> Result<Environment,
             Environment::Constant(Rgb::BLACK)
         }
     })
-}
-
-/// True if a material depends on the direction of dp/du: anisotropy, bump and normal maps.
-fn is_oriented(bsdfs: &[BsdfDesc], id: BsdfId, nesting: usize) -> bool {
-    let Some(bsdf) = bsdfs.get(id.index()) else { return false };
-    // A chain longer than the arena goes in circles; building the materials reports it.
-    if nesting > bsdfs.len() {
-        return false;
-    }
-    let nested = |id: BsdfId| is_oriented(bsdfs, id, nesting + 1);
-    match &bsdf.kind {
-        BsdfKind::RoughDielectric { roughness, .. } | BsdfKind::RoughConductor { roughness, .. } => {
-            roughness.alpha_u != roughness.alpha_v
-        }
-        BsdfKind::Ward { alpha_u, alpha_v, .. } => alpha_u != alpha_v,
-        BsdfKind::Principled(p) => p.anisotropic != ScalarDesc::Constant(0.0),
-        BsdfKind::BumpMap { .. } | BsdfKind::NormalMap { .. } => true,
-        BsdfKind::TwoSided { front, back } => nested(*front) || nested(*back),
-        BsdfKind::Mask { nested: id, .. } => nested(*id),
-        BsdfKind::Blend { a, b, .. } => nested(*a) || nested(*b),
-        _ => false,
-    }
 }
 
 fn features(

@@ -1,9 +1,11 @@
-//! What a scene file says, as plain data with source spans ([`desc`]), and what is wrong with it ([`diag`], [`validate`]).
-//! No acceleration structures, nothing that renders.
+//! What a scene file says, as plain data with source spans ([`desc`], materials in [`bsdf`]), and what is wrong with it
+//! ([`diag`], [`validate`]). No acceleration structures, nothing that renders.
 
+pub mod bsdf;
 pub mod desc;
 pub mod diag;
 pub mod validate;
 
+pub use bsdf::*;
 pub use desc::*;
 pub use diag::{Diagnostic, Diagnostics, Severity, Span};

@@ -1,8 +1,8 @@
 //! Textures: colours and numbers that vary over a surface.
 //!
-//! Conventions of Mitsuba 3's `bitmap` and `checkerboard`: texel centres lie at integers + ½, row = v · height counted from the
-//! top of the picture, and wrapping acts on texels. Eight-bit pictures are decoded on reading, through a table of 256 values
-//! that holds the transfer curve and the scale, so they take no more memory than their file.
+//! Conventions of Mitsuba 3's `bitmap` and `checkerboard`: texel centres lie at integers + ½, row = v · height counted
+//! from the top of the picture, and wrapping acts on texels. Eight-bit pictures are decoded on reading, through a table
+//! of 256 values that holds the transfer curve and the scale, so they take no more memory than their file.
 
 use super::SurfacePoint;
 use crate::image::{Image, Pixels};
@@ -58,7 +58,7 @@ impl Texture {
 /// A colour that may vary over a surface.
 #[derive(Clone, Debug)]
 pub enum ColorTexture {
-    /// The same everywhere.
+    /// Constant.
     Constant(Rgb),
     /// Looked up.
     Texture(Arc<Texture>),
@@ -91,7 +91,7 @@ impl ColorTexture {
 /// A number that may vary over a surface.
 #[derive(Clone, Debug)]
 pub enum ScalarTexture {
-    /// The same everywhere.
+    /// Constant.
     Constant(f32),
     /// Looked up: the single channel, or the luminance.
     Texture(Arc<Texture>),
@@ -133,7 +133,7 @@ fn map_uv(m: &UvMap, uv: Vec2) -> Vec2 {
 #[derive(Debug)]
 pub struct Bitmap {
     image: Arc<Image>,
-    /// What an eight-bit value means, scale included; empty for float pictures.
+    /// Meaning of eight-bit values, scale included; empty for float pictures.
     decode: Vec<f32>,
     /// Multiplies float pictures.
     scale: f32,
@@ -312,8 +312,8 @@ pub struct TextureSet {
 const MAX_NESTING: u32 = 16;
 
 impl TextureSet {
-    /// Builds every texture. A texture that cannot be built (no such picture, no pixels, a cycle) is reported as an error and
-    /// reads as mid grey.
+    /// Builds every texture. A texture that cannot be built (no such picture, no pixels, a cycle) is reported as an
+    /// error and reads as mid grey.
     pub fn build(descs: &[TextureDesc], images: &[ImageDesc], diagnostics: &mut Diagnostics) -> TextureSet {
         let mut set = TextureSet { textures: vec![None; descs.len()] };
         for i in 0..descs.len() {
@@ -367,7 +367,7 @@ impl TextureSet {
         self.textures.get(id.index())?.as_ref()
     }
 
-    /// What a description means.
+    /// Binds a description to its texture.
     pub fn color(&self, desc: ColorDesc) -> ColorTexture {
         match desc {
             ColorDesc::Constant(c) => ColorTexture::Constant(c),
@@ -378,7 +378,7 @@ impl TextureSet {
         }
     }
 
-    /// What a description means.
+    /// Binds a description to its texture.
     pub fn scalar(&self, desc: ScalarDesc) -> ScalarTexture {
         match desc {
             ScalarDesc::Constant(c) => ScalarTexture::Constant(c),

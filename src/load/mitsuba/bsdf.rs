@@ -1,34 +1,58 @@
-//! Materials.
+//! Materials: scattering models by the table of [`MODELS`], operators on other materials by [`OPERATORS`].
 
 use super::conductors;
-use super::indices::{BK7, POLYPROPYLENE};
 use super::objects::Builder;
 use super::props::Props;
 use super::spectrum::Purpose::Reflectance;
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, nearest};
-use crate::scene::{BsdfDesc, BsdfId, BsdfKind, ColorDesc, Distribution, PrincipledDesc, RoughnessDesc, WardVariant};
+use crate::scene::{
+    BsdfDesc, BsdfId, BsdfKind, ColorDesc, ComplexIor, Distribution, MODELS, ParamSource, Roughness, ScalarDesc,
+    TextureId, WardVariant,
+};
 
-const PLUGINS: [&str; 16] = [
-    "diffuse",
-    "dielectric",
-    "thindielectric",
-    "roughdielectric",
-    "conductor",
-    "roughconductor",
-    "plastic",
-    "roughplastic",
-    "principled",
-    "phong",
-    "ward",
-    "twosided",
-    "mask",
-    "bumpmap",
-    "normalmap",
-    "blendbsdf",
+/// Reads a plugin that combines or modifies other materials.
+type ReadOperator = fn(&mut Builder<'_>, &Props<'_>) -> Option<BsdfKind>;
+
+/// Plugins that combine or modify other materials.
+const OPERATORS: [(&str, ReadOperator); 6] = [
+    ("twosided", two_sided),
+    ("mask", mask),
+    ("bumpmap", bump_map),
+    ("normalmap", normal_map),
+    ("blendbsdf", blend),
+    ("null", |_, _| Some(BsdfKind::Null)),
 ];
-/// Plugins of old versions that are read as another one.
-const REPLACED: [(&str, &str); 2] = [("roughdiffuse", "diffuse"), ("difftrans", "diffuse")];
+
+/// A plugin of old versions that is read as a supported one.
+struct ReplacedPlugin {
+    name: &'static str,
+    replacement: &'static str,
+    /// Properties without a counterpart in the replacement.
+    ignored: &'static [&'static str],
+}
+
+const REPLACED: [ReplacedPlugin; 2] = [
+    ReplacedPlugin { name: "roughdiffuse", replacement: "diffuse", ignored: &["alpha", "use_fast_approx"] },
+    ReplacedPlugin { name: "difftrans", replacement: "diffuse", ignored: &["transmittance"] },
+];
+
+/// A second spelling of a property; it takes precedence where it is given.
+struct PropertyAlias {
+    plugin: &'static str,
+    name: &'static str,
+    alias: &'static str,
+}
+
+const ALIASES: [PropertyAlias; 3] = [
+    PropertyAlias { plugin: "diffuse", name: "reflectance", alias: "diffuse_reflectance" },
+    PropertyAlias { plugin: "ward", name: "alpha_u", alias: "alpha" },
+    PropertyAlias { plugin: "ward", name: "alpha_v", alias: "alpha" },
+];
+
+/// Values of the property `variant` of the plugin `ward`.
+const WARD_VARIANTS: [(&str, WardVariant); 3] =
+    [("balanced", WardVariant::Balanced), ("ward", WardVariant::Ward), ("ward-duer", WardVariant::WardDuer)];
 
 impl Builder<'_> {
     /// The material that an element is or refers to.
@@ -56,132 +80,27 @@ impl Builder<'_> {
     }
 
     fn bsdf_kind(&mut self, props: &Props<'_>) -> Option<BsdfKind> {
-        let p = props;
-        let mut plugin = p.plugin;
-        if let Some((old, new)) = REPLACED.iter().find(|(old, _)| *old == plugin) {
-            let d = Diagnostic::warning(
-                "scene::replaced-plugin",
-                format!("`{old}` is not supported: `{new}` is used instead"),
-            );
-            self.push(d.at(p.element().span_of("type")));
-            p.ignore(&["alpha", "use_fast_approx", "transmittance"]);
-            plugin = new;
+        let plugin = self.supported_plugin(props);
+        if let Some(model) = MODELS.iter().find(|model| model.name == plugin) {
+            let mut source = BsdfProps { builder: self, props, plugin };
+            return Some(BsdfKind::Model((model.read)(&mut source)));
         }
-        Some(match plugin {
-            "diffuse" => {
-                let name = if p.has("diffuse_reflectance") { "diffuse_reflectance" } else { "reflectance" };
-                BsdfKind::Diffuse { reflectance: self.color(p, name, 0.5, Reflectance) }
-            }
-            "dielectric" => {
-                let (specular_reflectance, specular_transmittance) = self.tints(p);
-                BsdfKind::Dielectric { eta: self.relative_ior(p, BK7), specular_reflectance, specular_transmittance }
-            }
-            "thindielectric" => {
-                let (specular_reflectance, specular_transmittance) = self.tints(p);
-                BsdfKind::ThinDielectric {
-                    eta: self.relative_ior(p, BK7),
-                    specular_reflectance,
-                    specular_transmittance,
-                }
-            }
-            "roughdielectric" => {
-                let (specular_reflectance, specular_transmittance) = self.tints(p);
-                let roughness = self.roughness(p);
-                BsdfKind::RoughDielectric {
-                    roughness,
-                    eta: self.relative_ior(p, BK7),
-                    specular_reflectance,
-                    specular_transmittance,
-                }
-            }
-            "conductor" => {
-                let (eta, k) = self.metal(p);
-                BsdfKind::Conductor {
-                    eta,
-                    k,
-                    specular_reflectance: self.color(p, "specular_reflectance", 1.0, Reflectance),
-                }
-            }
-            "roughconductor" => {
-                let (eta, k) = self.metal(p);
-                let roughness = self.roughness(p);
-                BsdfKind::RoughConductor {
-                    roughness,
-                    eta,
-                    k,
-                    specular_reflectance: self.color(p, "specular_reflectance", 1.0, Reflectance),
-                }
-            }
-            "plastic" => BsdfKind::Plastic {
-                eta: self.relative_ior(p, POLYPROPYLENE),
-                diffuse_reflectance: self.color(p, "diffuse_reflectance", 0.5, Reflectance),
-                specular_reflectance: self.color(p, "specular_reflectance", 1.0, Reflectance),
-                nonlinear: p.boolean_or("nonlinear", false),
-            },
-            "roughplastic" => BsdfKind::RoughPlastic {
-                roughness: self.roughness(p),
-                eta: self.relative_ior(p, POLYPROPYLENE),
-                diffuse_reflectance: self.color(p, "diffuse_reflectance", 0.5, Reflectance),
-                specular_reflectance: self.color(p, "specular_reflectance", 1.0, Reflectance),
-                nonlinear: p.boolean_or("nonlinear", false),
-            },
-            "principled" => BsdfKind::Principled(Box::new(self.principled(p))),
-            "phong" => BsdfKind::Phong {
-                exponent: self.scalar(p, "exponent", 30.0),
-                specular_reflectance: self.color(p, "specular_reflectance", 0.2, Reflectance),
-                diffuse_reflectance: self.color(p, "diffuse_reflectance", 0.5, Reflectance),
-            },
-            "ward" => {
-                let both = p.has("alpha");
-                let variants = [
-                    ("balanced", WardVariant::Balanced),
-                    ("ward", WardVariant::Ward),
-                    ("ward-duer", WardVariant::WardDuer),
-                ];
-                BsdfKind::Ward {
-                    alpha_u: self.scalar(p, if both { "alpha" } else { "alpha_u" }, 0.1),
-                    alpha_v: self.scalar(p, if both { "alpha" } else { "alpha_v" }, 0.1),
-                    variant: p.choice("variant", &variants, WardVariant::Balanced),
-                    specular_reflectance: self.color(p, "specular_reflectance", 0.2, Reflectance),
-                    diffuse_reflectance: self.color(p, "diffuse_reflectance", 0.5, Reflectance),
-                }
-            }
-            "twosided" => {
-                let nested = self.nested(p, 1..=2)?;
-                BsdfKind::TwoSided { front: nested[0], back: nested[nested.len() - 1] }
-            }
-            "mask" => {
-                let opacity = self.scalar(p, "opacity", 0.5);
-                BsdfKind::Mask { opacity, nested: self.nested(p, 1..=1)?[0] }
-            }
-            "bumpmap" => {
-                let scale = p.float_or("scale", 1.0) as f32;
-                let (height, nested) = self.texture_and_nested(p, ["map", "bumpmap"])?;
-                BsdfKind::BumpMap { nested, height, scale }
-            }
-            "normalmap" => {
-                let (normals, nested) = self.texture_and_nested(p, ["normalmap", "map"])?;
-                BsdfKind::NormalMap { nested, normals }
-            }
-            "blendbsdf" => {
-                let weight = self.scalar(p, "weight", 0.5);
-                let nested = self.nested(p, 2..=2)?;
-                BsdfKind::Blend { weight, a: nested[0], b: nested[1] }
-            }
-            "null" => BsdfKind::Null,
-            _ => {
-                let known: Vec<&str> = PLUGINS.iter().copied().chain(["null"]).collect();
-                self.unknown_plugin(p, &known);
-                return None;
-            }
-        })
+        if let Some((_, read)) = OPERATORS.iter().find(|(name, _)| *name == plugin) {
+            return read(self, props);
+        }
+        let models = MODELS.iter().map(|model| model.name);
+        let known: Vec<&str> = models.chain(OPERATORS.iter().map(|(name, _)| *name)).collect();
+        self.unknown_plugin(props, &known);
+        None
     }
 
-    fn tints(&mut self, p: &Props<'_>) -> (ColorDesc, ColorDesc) {
-        (
-            self.color(p, "specular_reflectance", 1.0, Reflectance),
-            self.color(p, "specular_transmittance", 1.0, Reflectance),
-        )
+    /// The plugin's name, or that of its replacement, with a warning.
+    fn supported_plugin<'p>(&mut self, props: &Props<'p>) -> &'p str {
+        let Some(replaced) = REPLACED.iter().find(|r| r.name == props.plugin) else { return props.plugin };
+        let message = format!("`{}` is not supported: `{}` is used instead", replaced.name, replaced.replacement);
+        self.push(Diagnostic::warning("scene::replaced-plugin", message).at(props.element().span_of("type")));
+        props.ignore(replaced.ignored);
+        replaced.replacement
     }
 
     /// Nested materials, named or not, in the order of the file.
@@ -203,11 +122,7 @@ impl Builder<'_> {
     }
 
     /// A texture of plain numbers (with or without one of the given names) and one material.
-    fn texture_and_nested(
-        &mut self,
-        p: &Props<'_>,
-        names: [&'static str; 2],
-    ) -> Option<(crate::scene::TextureId, BsdfId)> {
+    fn texture_and_nested(&mut self, p: &Props<'_>, names: [&'static str; 2]) -> Option<(TextureId, BsdfId)> {
         let mut texture = names.into_iter().find_map(|n| p.get_index(n));
         let mut nested = Vec::new();
         for object in p.objects() {
@@ -225,58 +140,70 @@ impl Builder<'_> {
         let (texture, nested) = (self.texture(texture, object, true), self.bsdf(nested));
         Some((texture?, nested?))
     }
+}
 
-    fn roughness(&mut self, p: &Props<'_>) -> RoughnessDesc {
-        let mut choices = vec![("beckmann", Distribution::Beckmann), ("ggx", Distribution::Ggx)];
-        if let Some(node) = p.get("distribution")
-            && node.attr("value").is_some_and(|a| matches!(a.value.as_str(), "phong" | "as"))
-        {
-            let d = Diagnostic::warning(
-                "scene::replaced-distribution",
-                "this distribution of normals is not supported: ggx is used",
-            );
-            self.push(d.at(node.span_of("value")));
-            choices.extend([("phong", Distribution::Ggx), ("as", Distribution::Ggx)]);
-        }
-        let distribution = p.choice("distribution", &choices, Distribution::Beckmann);
-        let sample_visible = p.boolean_or("sample_visible", true);
-        if p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")) {
-            p.error("scene::duplicate-property", "give either `alpha` or `alpha_u` and `alpha_v`");
-        }
-        let (u, v) = if p.has("alpha") { ("alpha", "alpha") } else { ("alpha_u", "alpha_v") };
-        let alpha_u = self.scalar(p, u, 0.1);
-        let alpha_v = self.scalar(p, v, 0.1);
-        RoughnessDesc { distribution, alpha_u, alpha_v, sample_visible }
+fn two_sided(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
+    let nested = builder.nested(props, 1..=2)?;
+    Some(BsdfKind::TwoSided { front: nested[0], back: nested[nested.len() - 1] })
+}
+
+fn mask(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
+    let opacity = builder.scalar(props, "opacity", 0.5);
+    Some(BsdfKind::Mask { opacity, nested: builder.nested(props, 1..=1)?[0] })
+}
+
+fn bump_map(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
+    let scale = props.float_or("scale", 1.0) as f32;
+    let (height, nested) = builder.texture_and_nested(props, ["map", "bumpmap"])?;
+    Some(BsdfKind::BumpMap { nested, height, scale })
+}
+
+fn normal_map(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
+    let (normals, nested) = builder.texture_and_nested(props, ["normalmap", "map"])?;
+    Some(BsdfKind::NormalMap { nested, normals })
+}
+
+fn blend(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
+    let weight = builder.scalar(props, "weight", 0.5);
+    let nested = builder.nested(props, 2..=2)?;
+    Some(BsdfKind::Blend { weight, a: nested[0], b: nested[1] })
+}
+
+/// The properties of a plugin as parameters of a scattering model.
+struct BsdfProps<'b, 'd, 'p, 't> {
+    builder: &'b mut Builder<'d>,
+    props: &'p Props<'t>,
+    plugin: &'p str,
+}
+
+impl BsdfProps<'_, '_, '_, '_> {
+    /// The spelling of a property that the file uses.
+    fn spelling(&self, name: &'static str) -> &'static str {
+        let alias = ALIASES.iter().find(|a| a.plugin == self.plugin && a.name == name).map(|a| a.alias);
+        alias.filter(|alias| self.props.has(alias)).unwrap_or(name)
+    }
+}
+
+impl ParamSource for BsdfProps<'_, '_, '_, '_> {
+    fn color(&mut self, name: &'static str, default: f32) -> ColorDesc {
+        self.builder.color(self.props, self.spelling(name), default, Reflectance)
     }
 
-    /// η and κ: by the name of a metal, or as given (a perfect mirror if nothing is given).
-    fn metal(&mut self, p: &Props<'_>) -> (ColorDesc, ColorDesc) {
-        let named = p.string("material").unwrap_or("none");
-        let given = (self.optional_color(p, "eta", Reflectance), self.optional_color(p, "k", Reflectance));
-        let Some((eta, k)) = conductors::find(named) else {
-            if let Some(node) = p.get("material") {
-                let expected = match nearest(named, conductors::names()) {
-                    Some(near) => format!("a metal; did you mean `{near}`?"),
-                    None => format!("one of: {}", conductors::names().collect::<Vec<_>>().join(", ")),
-                };
-                p.bad_value(node, "value", format!("unknown conductor `{named}`"), &expected);
-            }
-            return (ColorDesc::Constant(Rgb::BLACK), ColorDesc::Constant(Rgb::WHITE));
-        };
-        if named != "none" && (given.0.is_some() || given.1.is_some()) {
-            p.error("scene::duplicate-property", "give either `material` or `eta` and `k`");
-        }
-        // 0.6: relative to what is outside.
-        let outside = 1.0 / p.positive_or("ext_eta", 1.0) as f32;
-        let relative = |c: ColorDesc| match c {
-            ColorDesc::Constant(c) => ColorDesc::Constant(c * outside),
-            texture => texture,
-        };
-        let or = |c: Option<ColorDesc>, table: [f32; 3]| relative(c.unwrap_or(ColorDesc::Constant(table.into())));
-        (or(given.0, eta), or(given.1, k))
+    fn scalar(&mut self, name: &'static str, default: f32) -> ScalarDesc {
+        self.builder.scalar(self.props, self.spelling(name), default)
     }
 
-    fn principled(&mut self, p: &Props<'_>) -> PrincipledDesc {
+    fn flag(&mut self, name: &'static str, default: bool) -> bool {
+        self.props.boolean_or(name, default)
+    }
+
+    fn relative_ior(&mut self, interior: f64) -> f32 {
+        self.builder.relative_ior(self.props, interior)
+    }
+
+    fn principled_ior(&mut self) -> f32 {
+        let p = self.props;
+        p.ignore(&["main_specular_sampling_rate", "clearcoat_sampling_rate", "diffuse_reflectance_sampling_rate"]);
         let eta = match (p.float("eta"), p.float("specular")) {
             (Some(_), Some(_)) => {
                 p.error("scene::duplicate-property", "give either `eta` or `specular`");
@@ -286,20 +213,63 @@ impl Builder<'_> {
             // Burley 2012: specular 0 … 1 is a reflectance of 0 … 0.08 at normal incidence.
             (None, specular) => 2.0 / (1.0 - (0.08 * specular.unwrap_or(0.5)).max(0.0).sqrt()) - 1.0,
         };
-        p.ignore(&["main_specular_sampling_rate", "clearcoat_sampling_rate", "diffuse_reflectance_sampling_rate"]);
-        PrincipledDesc {
-            base_color: self.color(p, "base_color", 0.5, Reflectance),
-            roughness: self.scalar(p, "roughness", 0.5),
-            anisotropic: self.scalar(p, "anisotropic", 0.0),
-            metallic: self.scalar(p, "metallic", 0.0),
-            spec_trans: self.scalar(p, "spec_trans", 0.0),
-            eta: eta as f32,
-            spec_tint: self.scalar(p, "spec_tint", 0.0),
-            sheen: self.scalar(p, "sheen", 0.0),
-            sheen_tint: self.scalar(p, "sheen_tint", 0.0),
-            flatness: self.scalar(p, "flatness", 0.0),
-            clearcoat: self.scalar(p, "clearcoat", 0.0),
-            clearcoat_gloss: self.scalar(p, "clearcoat_gloss", 0.0),
+        eta as f32
+    }
+
+    /// By the name of a metal, or as given.
+    fn complex_ior(&mut self) -> ComplexIor {
+        let p = self.props;
+        let named = p.string("material").unwrap_or("none");
+        let given_eta = self.builder.optional_color(p, "eta", Reflectance);
+        let given_k = self.builder.optional_color(p, "k", Reflectance);
+        let Some((eta, k)) = conductors::find(named) else {
+            if let Some(node) = p.get("material") {
+                let expected = match nearest(named, conductors::names()) {
+                    Some(near) => format!("a metal; did you mean `{near}`?"),
+                    None => format!("one of: {}", conductors::names().collect::<Vec<_>>().join(", ")),
+                };
+                p.bad_value(node, "value", format!("unknown conductor `{named}`"), &expected);
+            }
+            return ComplexIor { eta: ColorDesc::Constant(Rgb::BLACK), k: ColorDesc::Constant(Rgb::WHITE) };
+        };
+        if named != "none" && (given_eta.is_some() || given_k.is_some()) {
+            p.error("scene::duplicate-property", "give either `material` or `eta` and `k`");
         }
+        // Mitsuba 0.6: relative to the index of the exterior.
+        let outside = 1.0 / p.positive_or("ext_eta", 1.0) as f32;
+        let relative = |c: ColorDesc| match c {
+            ColorDesc::Constant(c) => ColorDesc::Constant(c * outside),
+            texture => texture,
+        };
+        let or = |c: Option<ColorDesc>, table: [f32; 3]| relative(c.unwrap_or(ColorDesc::Constant(table.into())));
+        ComplexIor { eta: or(given_eta, eta), k: or(given_k, k) }
+    }
+
+    fn roughness(&mut self) -> Roughness {
+        let p = self.props;
+        let mut choices = vec![("beckmann", Distribution::Beckmann), ("ggx", Distribution::Ggx)];
+        if let Some(node) = p.get("distribution")
+            && node.attr("value").is_some_and(|a| matches!(a.value.as_str(), "phong" | "as"))
+        {
+            let d = Diagnostic::warning(
+                "scene::replaced-distribution",
+                "this distribution of normals is not supported: ggx is used",
+            );
+            self.builder.push(d.at(node.span_of("value")));
+            choices.extend([("phong", Distribution::Ggx), ("as", Distribution::Ggx)]);
+        }
+        let distribution = p.choice("distribution", &choices, Distribution::Beckmann);
+        let sample_visible = p.boolean_or("sample_visible", true);
+        if p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")) {
+            p.error("scene::duplicate-property", "give either `alpha` or `alpha_u` and `alpha_v`");
+        }
+        let (u, v) = if p.has("alpha") { ("alpha", "alpha") } else { ("alpha_u", "alpha_v") };
+        let alpha_u = self.builder.scalar(p, u, 0.1);
+        let alpha_v = self.builder.scalar(p, v, 0.1);
+        Roughness { distribution, alpha_u, alpha_v, sample_visible }
+    }
+
+    fn ward_variant(&mut self, name: &'static str, default: WardVariant) -> WardVariant {
+        self.props.choice(name, &WARD_VARIANTS, default)
     }
 }

@@ -31,10 +31,6 @@ const NAMED: [(&str, f64); 23] = [
     ("diamond", 2.419),
 ];
 
-/// Borosilicate crown glass.
-pub(super) const BK7: f64 = 1.504_6;
-/// Polypropylene.
-pub(super) const POLYPROPYLENE: f64 = 1.49;
 const AIR: f64 = 1.000_277;
 
 impl Builder<'_> {

@@ -9,7 +9,9 @@ use crate::load::mesh::MeshOptions;
 use crate::load::primitives::Primitive;
 use crate::math::{Frame, Rgb};
 use crate::scene::diag::Diagnostic;
-use crate::scene::{AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, GroupDesc, GroupId, InstanceDesc, ShapeDesc};
+use crate::scene::{
+    AreaEmission, BsdfDesc, BsdfId, ColorDesc, DiffuseParams, GroupDesc, GroupId, InstanceDesc, ShapeDesc,
+};
 use glam::{DMat4, DVec3};
 
 const PLUGINS: [&str; 10] =
@@ -159,7 +161,7 @@ impl Builder<'_> {
         p.finish();
         // As in Mitsuba 3, a light without a material reflects nothing.
         if emission.is_some() && bsdf.is_none() {
-            let kind = BsdfKind::Diffuse { reflectance: ColorDesc::Constant(Rgb::BLACK) };
+            let kind = DiffuseParams { reflectance: ColorDesc::Constant(Rgb::BLACK) }.into();
             self.scene.bsdfs.push(BsdfDesc { name: None, kind, span: None });
             bsdf = Some(BsdfId((self.scene.bsdfs.len() - 1) as u32));
         }

@@ -207,7 +207,7 @@ fn includes_are_put_in_place_and_keep_their_own_spans() {
     ]);
     let (scene, found) = files.load(&LoadOptions::default()).unwrap();
     assert!(
-        matches!(bsdf(&scene, "m"), BsdfKind::Plastic { diffuse_reflectance: ColorDesc::Constant(c), .. } if c == Rgb::grey(0.1))
+        matches!(bsdf(&scene, "m"), BsdfKind::Model(BsdfModel::Plastic(PlasticParams { diffuse_reflectance: ColorDesc::Constant(c), .. })) if c == Rgb::grey(0.1))
     );
     let span = found.list[0].span.as_ref().unwrap();
     assert!(span.source.path.ends_with("more.xml"));
@@ -245,7 +245,10 @@ fn old_spellings_are_renamed() {
         (30.0, FovAxis::Y, 0.1, 5.0, Some(16))
     );
     assert!(s.shapes[0].flip_normals);
-    let BsdfKind::RoughDielectric { roughness, eta: 1.5, .. } = bsdf(&s, "b") else { panic!() };
+    let BsdfKind::Model(BsdfModel::RoughDielectric(RoughDielectricParams { roughness, eta: 1.5, .. })) = bsdf(&s, "b")
+    else {
+        panic!()
+    };
     assert_eq!((roughness.alpha_u, roughness.alpha_v), (ScalarDesc::Constant(0.2), ScalarDesc::Constant(0.3)));
     // Mitsuba 3.9.1: the offset counts before the scale.
     assert!(matches!(s.textures[0], TextureDesc::Checkerboard { to_uv: [[2.0, 0.0, 0.5], [0.0, 1.0, 0.0]], .. }));
@@ -351,32 +354,64 @@ fn every_material_is_read() {
          <bsdf type=\"normalmap\" id=\"normal\"><texture name=\"normalmap\" type=\"checkerboard\"/><ref id=\"diffuse\"/></bsdf>",
     );
     let grey = |v| ColorDesc::Constant(Rgb::grey(v));
-    assert!(matches!(bsdf(&s, "diffuse"), BsdfKind::Diffuse { reflectance } if reflectance == grey(0.5)));
-    // Mitsuba 3.9.1: bk7 in air.
-    assert!(matches!(bsdf(&s, "dielectric"), BsdfKind::Dielectric { eta, .. } if (eta - 1.504_183_3).abs() < 1e-6));
-    assert!(matches!(bsdf(&s, "thin"), BsdfKind::ThinDielectric { eta, .. } if (eta - 1.504_183_3).abs() < 1e-6));
-    assert!(matches!(bsdf(&s, "mirror"), BsdfKind::Conductor { eta, k, .. } if eta == grey(0.0) && k == grey(1.0)));
     assert!(
-        matches!(bsdf(&s, "au"), BsdfKind::Conductor { eta: ColorDesc::Constant(e), .. } if (e.g - 0.375_307).abs() < 1e-6)
+        matches!(bsdf(&s, "diffuse"), BsdfKind::Model(BsdfModel::Diffuse(DiffuseParams { reflectance })) if reflectance == grey(0.5))
     );
-    let BsdfKind::RoughConductor { roughness, eta: ColorDesc::Constant(eta), k, .. } = bsdf(&s, "rc") else { panic!() };
+    // Mitsuba 3.9.1: bk7 in air.
+    assert!(
+        matches!(bsdf(&s, "dielectric"), BsdfKind::Model(BsdfModel::Dielectric(DielectricParams { eta, .. })) if (eta - 1.504_183_3).abs() < 1e-6)
+    );
+    assert!(
+        matches!(bsdf(&s, "thin"), BsdfKind::Model(BsdfModel::ThinDielectric(ThinDielectricParams { eta, .. })) if (eta - 1.504_183_3).abs() < 1e-6)
+    );
+    assert!(
+        matches!(bsdf(&s, "mirror"), BsdfKind::Model(BsdfModel::Conductor(ConductorParams { ior: ComplexIor { eta, k }, .. })) if eta == grey(0.0) && k == grey(1.0))
+    );
+    assert!(
+        matches!(bsdf(&s, "au"), BsdfKind::Model(BsdfModel::Conductor(ConductorParams { ior: ComplexIor { eta: ColorDesc::Constant(e), .. }, .. })) if (e.g - 0.375_307).abs() < 1e-6)
+    );
+    let BsdfKind::Model(BsdfModel::RoughConductor(RoughConductorParams {
+        roughness,
+        ior: ComplexIor { eta: ColorDesc::Constant(eta), k },
+        ..
+    })) = bsdf(&s, "rc")
+    else {
+        panic!()
+    };
     assert_eq!(
         (roughness.distribution, roughness.alpha_v, eta, k),
         (Distribution::Ggx, ScalarDesc::Constant(0.3), Rgb::new(1.0, 2.0, 3.0), grey(1.0))
     );
     assert!(
-        matches!(bsdf(&s, "plastic"), BsdfKind::Plastic { eta, nonlinear: true, .. } if (eta - 1.489_587_3).abs() < 1e-6)
+        matches!(bsdf(&s, "plastic"), BsdfKind::Model(BsdfModel::Plastic(PlasticParams { eta, nonlinear: true, .. })) if (eta - 1.489_587_3).abs() < 1e-6)
     );
-    assert!(matches!(bsdf(&s, "rp"), BsdfKind::RoughPlastic { eta: 1.333, nonlinear: false, .. }));
+    assert!(matches!(
+        bsdf(&s, "rp"),
+        BsdfKind::Model(BsdfModel::RoughPlastic(RoughPlasticParams { eta: 1.333, nonlinear: false, .. }))
+    ));
     assert!(
-        matches!(bsdf(&s, "principled"), BsdfKind::Principled(p) if (p.eta - 1.5).abs() < 1e-6 && p.roughness == ScalarDesc::Constant(0.5))
+        matches!(bsdf(&s, "principled"), BsdfKind::Model(BsdfModel::Principled(p)) if (p.eta - 1.5).abs() < 1e-6 && p.roughness == ScalarDesc::Constant(0.5))
     );
-    assert!(matches!(bsdf(&s, "phong"), BsdfKind::Phong { exponent: ScalarDesc::Constant(30.0), .. }));
-    assert!(matches!(bsdf(&s, "ward"), BsdfKind::Ward { variant: WardVariant::Balanced, .. }));
+    assert!(matches!(
+        bsdf(&s, "phong"),
+        BsdfKind::Model(BsdfModel::Phong(PhongParams { exponent: ScalarDesc::Constant(30.0), .. }))
+    ));
+    assert!(matches!(
+        bsdf(&s, "ward"),
+        BsdfKind::Model(BsdfModel::Ward(WardParams { variant: WardVariant::Balanced, .. }))
+    ));
     assert!(matches!(bsdf(&s, "two"), BsdfKind::TwoSided { front, back } if front != back));
     assert!(matches!(bsdf(&s, "blend"), BsdfKind::Blend { weight: ScalarDesc::Constant(0.25), a, b } if a != b));
     assert!(matches!(bsdf(&s, "bump"), BsdfKind::BumpMap { scale: 2.0, .. }));
     assert!(matches!(bsdf(&s, "normal"), BsdfKind::NormalMap { .. }));
+}
+
+#[test]
+fn every_model_of_the_table_is_a_plugin() {
+    for model in MODELS {
+        let s = good(&format!("<bsdf type=\"{}\" id=\"m\"/>", model.name));
+        assert!(matches!(bsdf(&s, "m"), BsdfKind::Model(found) if found.name() == model.name), "{}", model.name);
+    }
 }
 
 #[test]

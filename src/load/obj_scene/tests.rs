@@ -1,5 +1,6 @@
 use super::*;
 use crate::load::load_scene;
+use crate::scene::BsdfModel;
 use crate::scene::Severity;
 use glam::DVec3;
 
@@ -32,18 +33,18 @@ fn materials_become_what_they_look_like() {
         other => panic!("{other:?}"),
     };
     assert!(
-        matches!(front(0), BsdfKind::Diffuse { reflectance: ColorDesc::Constant(c) } if *c == Rgb::new(0.2, 0.4, 0.6))
+        matches!(front(0), BsdfKind::Model(BsdfModel::Diffuse(DiffuseParams { reflectance: ColorDesc::Constant(c) })) if *c == Rgb::new(0.2, 0.4, 0.6))
     );
-    assert!(matches!(kind(1), BsdfKind::Dielectric { eta, .. } if *eta == 1.33));
+    assert!(matches!(kind(1), BsdfKind::Model(BsdfModel::Dielectric(DielectricParams { eta, .. })) if *eta == 1.33));
     assert_eq!(scene.shapes[2].emission.as_ref().unwrap().radiance, ColorDesc::Constant(Rgb::new(5.0, 4.0, 3.0)));
     assert!(
-        matches!(front(3), BsdfKind::Conductor { specular_reflectance: ColorDesc::Constant(c), .. } if *c == Rgb::grey(0.9))
+        matches!(front(3), BsdfKind::Model(BsdfModel::Conductor(ConductorParams { specular_reflectance: ColorDesc::Constant(c), .. })) if *c == Rgb::grey(0.9))
     );
     let BsdfKind::Mask { nested, opacity: ScalarDesc::Texture(_) } = kind(4) else { panic!("{:?}", kind(4)) };
     let BsdfKind::TwoSided { front, .. } = scene.bsdfs[nested.index()].kind else { panic!() };
     // 0.8 + 0.8 would reflect more than arrives.
     assert!(
-        matches!(&scene.bsdfs[front.index()].kind, BsdfKind::Phong { diffuse_reflectance: ColorDesc::Constant(c), .. } if (c.r - 0.5).abs() < 1e-6)
+        matches!(&scene.bsdfs[front.index()].kind, BsdfKind::Model(BsdfModel::Phong(PhongParams { diffuse_reflectance: ColorDesc::Constant(c), .. })) if (c.r - 0.5).abs() < 1e-6)
     );
     // The lamp shines: no sky. The missing picture is one magenta pixel and one warning, at its material.
     assert!(scene.emitters.is_empty());

@@ -1,103 +1,102 @@
-//! BSDFs that are kept: only the lobes that there are, side by side with those of others.
+//! Memory for many BSDFs: only the lobes that exist, side by side.
 
-use super::link::Link;
-use super::{Bsdf, BsdfOf, Leaf, Scattering};
+use super::Bsdf;
+use super::nested_frame::NestedFrame;
+use super::view::{BsdfView, Scattering, WeightedLobe};
 use crate::math::Vec3;
-
-/// A BSDF whose lobes are elsewhere.
-pub type BsdfView<'a> = BsdfOf<&'a [Leaf], &'a [Link]>;
 
 /// Lobes and frames of many BSDFs.
 #[derive(Clone, Debug, Default)]
 pub struct BsdfPool {
-    leaves: Vec<Leaf>,
-    links: Vec<Link>,
+    lobes: Vec<WeightedLobe>,
+    frames: Vec<NestedFrame>,
 }
 
 /// A BSDF in a pool.
 #[derive(Clone, Copy, Debug)]
 pub struct StoredBsdf {
     scattering: Scattering,
-    first_leaf: u32,
-    first_link: u32,
-    leaves: u8,
-    links: u8,
+    first_lobe: u32,
+    first_frame: u32,
+    lobes: u8,
+    frames: u8,
 }
 
-/// How far lobes went when their pool was appended to another.
+/// Index offsets of the lobes and frames of a pool that was appended to another.
 #[derive(Clone, Copy, Debug)]
 pub struct PoolOffset {
-    leaves: u32,
-    links: u32,
+    lobes: u32,
+    frames: u32,
 }
 
 impl StoredBsdf {
-    /// The same in the pool that its own was appended to.
+    /// The BSDF in the pool to which its own was appended.
     #[inline]
     #[must_use]
     pub fn offset_by(self, by: PoolOffset) -> StoredBsdf {
-        StoredBsdf { first_leaf: self.first_leaf + by.leaves, first_link: self.first_link + by.links, ..self }
+        StoredBsdf { first_lobe: self.first_lobe + by.lobes, first_frame: self.first_frame + by.frames, ..self }
     }
 }
 
 impl BsdfPool {
-    /// Takes in a BSDF.
+    /// Copies a BSDF into the pool.
     #[inline]
     pub fn store(&mut self, bsdf: &Bsdf) -> StoredBsdf {
-        self.store_parts(bsdf.scattering, &bsdf.leaves, &bsdf.links)
+        self.store_parts(bsdf.scattering, &bsdf.lobes, &bsdf.frames)
     }
 
-    /// Takes in a BSDF that `other` keeps.
+    /// Copies a BSDF of the pool `other` into this one.
     #[inline]
-    pub fn store_from(&mut self, kept: &StoredBsdf, other: &BsdfPool) -> StoredBsdf {
-        self.store_parts(kept.scattering, other.leaves(kept), other.links(kept))
+    pub fn store_from(&mut self, stored: &StoredBsdf, other: &BsdfPool) -> StoredBsdf {
+        self.store_parts(stored.scattering, other.lobes(stored), other.frames(stored))
     }
 
     #[inline]
-    fn store_parts(&mut self, scattering: Scattering, leaves: &[Leaf], links: &[Link]) -> StoredBsdf {
-        let kept = StoredBsdf {
+    fn store_parts(&mut self, scattering: Scattering, lobes: &[WeightedLobe], frames: &[NestedFrame]) -> StoredBsdf {
+        let stored = StoredBsdf {
             scattering,
-            first_leaf: self.leaves.len() as u32,
-            first_link: self.links.len() as u32,
-            leaves: leaves.len() as u8,
-            links: links.len() as u8,
+            first_lobe: self.lobes.len() as u32,
+            first_frame: self.frames.len() as u32,
+            lobes: lobes.len() as u8,
+            frames: frames.len() as u8,
         };
-        // Nearly always there is nothing.
-        if let Scattering::Lobes { .. } = scattering {
-            self.leaves.extend_from_slice(leaves);
-            self.links.extend_from_slice(links);
+        // Most BSDFs are Lambertian and have no lobes.
+        if let Scattering::Lobes(_) = scattering {
+            self.lobes.extend_from_slice(lobes);
+            self.frames.extend_from_slice(frames);
         }
-        kept
+        stored
     }
 
     #[inline]
-    fn leaves(&self, kept: &StoredBsdf) -> &[Leaf] {
-        &self.leaves[kept.first_leaf as usize..][..usize::from(kept.leaves)]
+    fn lobes(&self, stored: &StoredBsdf) -> &[WeightedLobe] {
+        &self.lobes[stored.first_lobe as usize..][..usize::from(stored.lobes)]
     }
 
     #[inline]
-    fn links(&self, kept: &StoredBsdf) -> &[Link] {
-        &self.links[kept.first_link as usize..][..usize::from(kept.links)]
+    fn frames(&self, stored: &StoredBsdf) -> &[NestedFrame] {
+        &self.frames[stored.first_frame as usize..][..usize::from(stored.frames)]
     }
 
-    /// A BSDF that was kept, at a point with the geometric normal `ng`.
+    /// A stored BSDF, at a point with the geometric normal `ng`.
     #[inline]
-    pub fn get(&self, kept: &StoredBsdf, ng: Vec3) -> BsdfView<'_> {
-        BsdfOf { ng, scattering: kept.scattering, leaves: self.leaves(kept), links: self.links(kept) }
+    pub fn get<'a>(&'a self, stored: &'a StoredBsdf, ng: Vec3) -> BsdfView<'a> {
+        BsdfView { ng, scattering: &stored.scattering, lobes: self.lobes(stored), frames: self.frames(stored) }
     }
 
-    /// Takes in all that `other` keeps; BSDFs kept there are to be [moved](StoredBsdf::offset_by) by what is returned.
+    /// Copies all BSDFs of `other` into this pool; those stored there are to be [offset](StoredBsdf::offset_by) by the
+    /// result.
     pub fn append(&mut self, other: &BsdfPool) -> PoolOffset {
-        let moved = PoolOffset { leaves: self.leaves.len() as u32, links: self.links.len() as u32 };
-        self.leaves.extend_from_slice(&other.leaves);
-        self.links.extend_from_slice(&other.links);
-        moved
+        let offset = PoolOffset { lobes: self.lobes.len() as u32, frames: self.frames.len() as u32 };
+        self.lobes.extend_from_slice(&other.lobes);
+        self.frames.extend_from_slice(&other.frames);
+        offset
     }
 
-    /// Forgets all, but not its memory.
+    /// Removes all BSDFs; the memory is kept for reuse.
     #[inline]
     pub fn clear(&mut self) {
-        self.leaves.clear();
-        self.links.clear();
+        self.lobes.clear();
+        self.frames.clear();
     }
 }

@@ -1,16 +1,17 @@
 //! Lambert's law: f = ρ/π on the front.
 
+use super::model::{AtPoint, LobeSample, Model, PointLookup, TextureBinder, Textured};
 use crate::math::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
 use crate::math::{Frame, Rgb, Vec3};
+use crate::scene::{ColorDesc, DiffuseParams};
+use crate::shade::SurfacePoint;
 use std::f32::consts::FRAC_1_PI;
 
 /// A Lambertian reflector.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Diffuse {
-    pub reflectance: Rgb,
-}
+pub(super) type Diffuse = DiffuseParams<AtPoint>;
 
-/// A Lambertian lobe that is all of a BSDF, in world coordinates. It needs the normal only: a frame is made when a direction is drawn.
+/// A BSDF that is a single Lambertian lobe, in world coordinates. Only its normal is stored; a frame is made when a
+/// direction is drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lambert {
     /// Shading normal on the side that reflects.
@@ -32,24 +33,39 @@ impl Lambert {
     }
 }
 
-impl Diffuse {
+impl Model for Diffuse {
+    type Params = DiffuseParams;
+    type Textured = DiffuseParams<Textured>;
+
+    fn bind(params: &DiffuseParams, binder: &mut TextureBinder) -> Result<DiffuseParams<Textured>, String> {
+        Ok(params.convert(binder))
+    }
+
+    fn at(textured: &DiffuseParams<Textured>, point: &SurfacePoint) -> Diffuse {
+        textured.convert(&mut PointLookup(point))
+    }
+
+    fn is_black(params: &DiffuseParams) -> bool {
+        matches!(params.reflectance, ColorDesc::Constant(c) if c.is_black())
+    }
+
     #[inline]
-    pub fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
+    fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
         let pdf = self.pdf(a, b);
         (self.reflectance * pdf, pdf)
     }
 
     #[inline]
-    pub fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
+    fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
         if a.z > 0.0 && b.z > 0.0 { b.z * FRAC_1_PI } else { 0.0 }
     }
 
     #[inline]
-    pub fn sample_direction(&self, a: Vec3, u: [f32; 3]) -> Option<Vec3> {
-        cosine_above(a, u)
+    fn sample(&self, a: Vec3, u: [f32; 3]) -> Option<LobeSample> {
+        cosine_above(a, u).map(LobeSample::Smooth)
     }
 
-    pub fn albedo(&self) -> Rgb {
+    fn albedo(&self) -> Rgb {
         self.reflectance
     }
 }

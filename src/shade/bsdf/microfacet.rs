@@ -1,14 +1,15 @@
-//! Distributions of microfacet normals: GGX and Beckmann, anisotropic (Walter et al. 2007; Heitz 2014), with sampling of all
-//! or of the visible normals.
+//! Distributions of microfacet normals: GGX and Beckmann, anisotropic (Walter et al. 2007; Heitz 2014), with sampling
+//! of all or of the visible normals.
 //!
-//! GGX draws visible normals by spherical caps (Dupuy & Benyoub 2023). Beckmann inverts the distribution of visible slopes
-//! (Heitz & d'Eon 2014) numerically. Its shadowing follows the rational fit of Walter et al. 2007, eq. 27 where values are concerned,
-//! as Mitsuba does, and the exact function where the *density* of visible normals is: the fit is off by up to 0.35 %, and a
-//! density must integrate to one.
+//! GGX draws visible normals by spherical caps (Dupuy & Benyoub 2023). Beckmann inverts the distribution of visible
+//! slopes (Heitz & d'Eon 2014) numerically. Its shadowing follows the rational fit of Walter et al. 2007, eq. 27 where
+//! values are concerned, as Mitsuba does, and the exact function where the *density* of visible normals is: the fit is
+//! off by up to 0.35 %, and a density must integrate to one.
 
+use super::model::AtPoint;
 use crate::math::erf::{erf, erf_inv};
 use crate::math::{Vec2, Vec3};
-use crate::scene::Distribution;
+use crate::scene::{Distribution, Roughness};
 use std::f32::consts::PI;
 
 const INV_SQRT_PI: f32 = std::f32::consts::FRAC_2_SQRT_PI * 0.5;
@@ -32,7 +33,12 @@ impl Microfacets {
         Microfacets { distribution, visible, alpha_u: alpha_u.max(MIN_ALPHA), alpha_v: alpha_v.max(MIN_ALPHA) }
     }
 
-    /// The same with roughness multiplied.
+    /// Microfacets of the roughness at a point.
+    pub fn from_roughness(r: &Roughness<AtPoint>) -> Microfacets {
+        Microfacets::new(r.distribution, r.alpha_u, r.alpha_v, r.sample_visible)
+    }
+
+    /// Microfacets with both roughnesses multiplied.
     pub fn scaled(&self, factor: f32) -> Microfacets {
         Microfacets { alpha_u: self.alpha_u * factor, alpha_v: self.alpha_v * factor, ..*self }
     }
@@ -83,8 +89,8 @@ impl Microfacets {
         }
     }
 
-    /// Density per steradian of [`Microfacets::sample`] divided by |v · m|, given `d` = D(m): the factor that Jacobians multiply.
-    /// `v` must be on the front and see `m`.
+    /// Density per steradian of [`Microfacets::sample`] divided by |v · m|, given `d` = D(m): the factor that Jacobians
+    /// multiply. `v` must be on the front and see `m`.
     pub fn pdf_over_dot(&self, v: Vec3, m: Vec3, d: f32) -> f32 {
         if self.visible { d * self.g1_exact(v) / v.z } else { d * m.z / v.dot(m).abs() }
     }
@@ -109,7 +115,8 @@ impl Microfacets {
         Vec3::new(self.alpha_u * r * cos, self.alpha_v * r * sin, 1.0).normalize_or(Vec3::Z)
     }
 
-    /// Dupuy & Benyoub 2023, listing 3: the visible half sphere mirrors v into a spherical cap, which is sampled uniformly.
+    /// Dupuy & Benyoub 2023, listing 3: the visible half sphere mirrors v into a spherical cap, which is sampled
+    /// uniformly.
     fn sample_visible_ggx(&self, v: Vec3, u: [f32; 2]) -> Vec3 {
         let stretched = Vec3::new(self.alpha_u * v.x, self.alpha_v * v.y, v.z).normalize_or(Vec3::Z);
         let (sin, cos) = (2.0 * PI * u[0]).sin_cos();

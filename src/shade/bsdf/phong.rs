@@ -1,9 +1,11 @@
 //! The modified Phong model (Lafortune & Willems 1994): a cosine power around the mirror direction over a diffuse base.
 
 use super::diffuse::{cosine_above, cosine_pdf};
-use super::lobe::choose;
+use super::model::{LobeSample, Model, PointLookup, TextureBinder, Textured, choose};
 use super::plastic::specular_weight;
 use crate::math::{Frame, Rgb, Vec3};
+use crate::scene::PhongParams;
+use crate::shade::SurfacePoint;
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Modified Phong.
@@ -26,18 +28,29 @@ fn mirrored(a: Vec3) -> Vec3 {
 }
 
 impl Phong {
-    pub fn new(exponent: f32, diffuse: Rgb, specular: Rgb) -> Phong {
-        let (diffuse, specular) = conserve(diffuse, specular);
-        Phong { exponent: exponent.max(0.0), specular, diffuse, specular_weight: specular_weight(diffuse, specular) }
-    }
-
     /// cos^n of the angle to the mirror direction.
     fn power(&self, a: Vec3, b: Vec3) -> f32 {
         let cos = b.dot(mirrored(a));
         if cos > 0.0 { cos.min(1.0).powf(self.exponent) } else { 0.0 }
     }
+}
 
-    pub fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
+impl Model for Phong {
+    type Params = PhongParams;
+    type Textured = PhongParams<Textured>;
+
+    fn bind(params: &PhongParams, binder: &mut TextureBinder) -> Result<PhongParams<Textured>, String> {
+        Ok(params.convert(binder))
+    }
+
+    fn at(textured: &PhongParams<Textured>, point: &SurfacePoint) -> Phong {
+        let params = textured.convert(&mut PointLookup(point));
+        let (diffuse, specular) = conserve(params.diffuse_reflectance, params.specular_reflectance);
+        let exponent = params.exponent.max(0.0);
+        Phong { exponent, specular, diffuse, specular_weight: specular_weight(diffuse, specular) }
+    }
+
+    fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
         if a.z <= 0.0 || b.z <= 0.0 {
             return (Rgb::BLACK, 0.0);
         }
@@ -48,11 +61,7 @@ impl Phong {
         (value, w * lobe * (self.exponent + 1.0) + (1.0 - w) * cosine)
     }
 
-    pub fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
-        self.eval_pdf(a, b).1
-    }
-
-    pub fn sample_direction(&self, a: Vec3, u: [f32; 3]) -> Option<Vec3> {
+    fn sample(&self, a: Vec3, u: [f32; 3]) -> Option<LobeSample> {
         if a.z <= 0.0 {
             return None;
         }
@@ -61,13 +70,13 @@ impl Phong {
             let r = (1.0 - cos * cos).max(0.0).sqrt();
             let (s, c) = (2.0 * PI * u[2]).sin_cos();
             let b = Frame::from_normal(mirrored(a)).to_world(Vec3::new(r * c, r * s, cos));
-            (b.z > 0.0).then_some(b)
+            (b.z > 0.0).then_some(LobeSample::Smooth(b))
         } else {
-            cosine_above(a, u)
+            cosine_above(a, u).map(LobeSample::Smooth)
         }
     }
 
-    pub fn albedo(&self) -> Rgb {
+    fn albedo(&self) -> Rgb {
         self.diffuse + self.specular
     }
 }

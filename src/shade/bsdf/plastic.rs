@@ -1,11 +1,13 @@
-//! A smooth coat over a diffuse base: a discrete reflection, and what enters the coat, scatters inside any number of times and
-//! leaves it (the `plastic` of Mitsuba).
+//! A smooth coat over a diffuse base (the `plastic` of Mitsuba): a discrete reflection by the coat, and light that enters
+//! the coat, scatters inside any number of times and leaves it.
 
 use super::dielectric::mirror;
 use super::diffuse::{cosine_above, cosine_pdf};
-use super::lobe::{LobeSample, choose};
+use super::model::{LobeSample, Model, PointLookup, TextureBinder, Textured, checked_ior, choose};
 use crate::math::fresnel::{dielectric, diffuse_reflectance, normal_incidence, schlick_average};
 use crate::math::{Rgb, Vec3};
+use crate::scene::PlasticParams;
+use crate::shade::SurfacePoint;
 
 /// A smooth coat over a diffuse base.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +16,7 @@ pub(super) struct Plastic {
     /// Albedo of the base over η², all internal reflections summed.
     base: Rgb,
     specular: Rgb,
-    /// Share of the specular lobe in the choice, before Fresnel's factor.
+    /// Probability of the specular lobe, before the Fresnel factor.
     specular_weight: f32,
 }
 
@@ -27,18 +29,13 @@ pub(super) fn internal_scattering(diffuse: Rgb, internal_reflectance: f32, nonli
     }
 }
 
-/// Share of the specular lobe when a coat and a base of these colours are chosen between.
+/// Probability of the specular lobe in the choice between a coat and a base of these colours.
 pub(super) fn specular_weight(diffuse: Rgb, specular: Rgb) -> f32 {
     let (d, s) = (diffuse.mean(), specular.mean());
     if s > 0.0 { s / (d + s) } else { 0.0 }
 }
 
 impl Plastic {
-    pub fn new(eta: f32, diffuse: Rgb, specular: Rgb, nonlinear: bool) -> Plastic {
-        let base = internal_scattering(diffuse, diffuse_reflectance(1.0 / eta), nonlinear) / (eta * eta);
-        Plastic { eta, base, specular, specular_weight: specular_weight(diffuse, specular) }
-    }
-
     fn fresnel(&self, cos: f32) -> f32 {
         dielectric(cos, self.eta).reflectance
     }
@@ -48,8 +45,25 @@ impl Plastic {
         let (s, d) = (f * self.specular_weight, (1.0 - f) * (1.0 - self.specular_weight));
         if s + d > 0.0 { s / (s + d) } else { 0.0 }
     }
+}
 
-    pub fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
+impl Model for Plastic {
+    type Params = PlasticParams;
+    type Textured = PlasticParams<Textured>;
+    const DELTA: bool = true;
+
+    fn bind(params: &PlasticParams, binder: &mut TextureBinder) -> Result<PlasticParams<Textured>, String> {
+        Ok(PlasticParams { eta: checked_ior(params.eta)?, ..params.convert(binder) })
+    }
+
+    fn at(textured: &PlasticParams<Textured>, point: &SurfacePoint) -> Plastic {
+        let params = textured.convert(&mut PointLookup(point));
+        let (eta, diffuse, specular) = (params.eta, params.diffuse_reflectance, params.specular_reflectance);
+        let base = internal_scattering(diffuse, diffuse_reflectance(1.0 / eta), params.nonlinear) / (eta * eta);
+        Plastic { eta, base, specular, specular_weight: specular_weight(diffuse, specular) }
+    }
+
+    fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
         if a.z <= 0.0 || b.z <= 0.0 {
             return (Rgb::BLACK, 0.0);
         }
@@ -58,14 +72,14 @@ impl Plastic {
         (self.base * ((1.0 - f_a) * (1.0 - f_b) * cosine), (1.0 - self.specular_probability(f_a)) * cosine)
     }
 
-    pub fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
+    fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
         if a.z <= 0.0 || b.z <= 0.0 {
             return 0.0;
         }
         (1.0 - self.specular_probability(self.fresnel(a.z))) * cosine_pdf(b)
     }
 
-    pub fn sample(&self, a: Vec3, u: [f32; 3]) -> Option<LobeSample> {
+    fn sample(&self, a: Vec3, u: [f32; 3]) -> Option<LobeSample> {
         if a.z <= 0.0 {
             return None;
         }
@@ -78,7 +92,7 @@ impl Plastic {
         }
     }
 
-    pub fn albedo(&self) -> Rgb {
+    fn albedo(&self) -> Rgb {
         let f = schlick_average(normal_incidence(self.eta));
         self.specular * f + self.base * ((1.0 - f) * (1.0 - f))
     }

@@ -1,35 +1,24 @@
-//! The "principled" material: Burley 2012, "Physically Based Shading at Disney", and 2015, "Extending the Disney BRDF to a BSDF",
-//! with the parameters and the combination of lobes of Mitsuba 3.
+//! The "principled" material: Burley 2012, "Physically Based Shading at Disney", and 2015, "Extending the Disney BRDF
+//! to a BSDF", with the parameters and the combination of lobes of Mitsuba 3.
 //!
-//! Lobes: a diffuse base with retro-reflection, fake subsurface scattering ("flatness") and sheen; a GGX reflection whose Fresnel
-//! factor blends dielectric, tinted and metallic; GGX refraction; a GTR1 clear coat. From behind there is only a plain rough
-//! dielectric, weighted by the share of refraction.
+//! Lobes: a diffuse base with retro-reflection, fake subsurface scattering ("flatness") and sheen; a GGX reflection
+//! whose Fresnel factor blends dielectric, tinted and metallic; GGX refraction; a GTR1 clear coat. The back is
+//! a plain rough dielectric, weighted by the fraction of refraction.
 
 use super::diffuse::{cosine_above, cosine_pdf};
-use super::lobe::choose;
 use super::microfacet::Microfacets;
+use super::model::{
+    AtPoint, LobeSample, Model, PointLookup, TextureBinder, Textured, away_from_one, checked_ior, choose,
+};
 use super::rough_dielectric::Interaction;
 use crate::math::fresnel::{dielectric, normal_incidence, reflect, refract, schlick_average};
 use crate::math::{Rgb, Vec3};
-use crate::scene::Distribution;
+use crate::scene::{Distribution, PrincipledParams, ScalarDesc};
+use crate::shade::SurfacePoint;
 use std::f32::consts::{FRAC_1_PI, PI};
 
-/// The material's parameters at a point.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Principled {
-    pub base_color: Rgb,
-    pub roughness: f32,
-    pub metallic: f32,
-    pub spec_trans: f32,
-    pub eta: f32,
-    pub spec_tint: f32,
-    pub sheen: f32,
-    pub sheen_tint: f32,
-    pub flatness: f32,
-    pub clearcoat: f32,
-    pub clearcoat_gloss: f32,
-    pub anisotropic: f32,
-}
+/// The principled material at a point.
+pub(super) type Principled = PrincipledParams<AtPoint>;
 
 /// Roughness of the coat's shadowing, fixed by Burley 2012.
 const COAT_SHADOWING_ALPHA: f32 = 0.25;
@@ -61,8 +50,8 @@ struct Shares {
 }
 
 impl Principled {
-    /// Some light passes through.
-    pub fn transmits(&self) -> bool {
+    /// Some light is refracted.
+    fn refracts(&self) -> bool {
         self.refraction() > 0.0
     }
 
@@ -143,9 +132,50 @@ impl Principled {
         (self.base_color * base + Rgb::WHITE.lerp(self.tint(), self.sheen_tint) * sheen) * b.z
     }
 
-    pub fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
+    fn coat_eval_pdf(&self, a: Vec3, b: Vec3, i: &Interaction) -> (f32, f32) {
+        let d = self.coat_d(i.m.z);
+        let f = mix(0.04, 1.0, schlick_mix(i.a_m, self.eta));
+        let shadowing = Microfacets::new(Distribution::Ggx, COAT_SHADOWING_ALPHA, COAT_SHADOWING_ALPHA, true);
+        let g = shadowing.g1(a, i.m) * shadowing.g1(b, i.m);
+        (0.25 * self.clearcoat * f * d * g * b.z, d * i.m.z / (4.0 * i.b_m))
+    }
+
+    /// Burley 2012, appendix B, eq. 5.
+    fn sample_coat(&self, u: [f32; 2]) -> Vec3 {
+        let a2 = self.coat_alpha() * self.coat_alpha();
+        let cos2 = ((1.0 - a2.powf(1.0 - u[1])) / (1.0 - a2)).clamp(0.0, 1.0);
+        let (sin, cos) = (2.0 * PI * u[0]).sin_cos();
+        let r = (1.0 - cos2).sqrt();
+        Vec3::new(r * cos, r * sin, cos2.sqrt())
+    }
+}
+
+impl Model for Principled {
+    type Params = PrincipledParams;
+    /// Boxed: these are many more parameters than other models have.
+    type Textured = Box<PrincipledParams<Textured>>;
+
+    fn bind(params: &PrincipledParams, binder: &mut TextureBinder) -> Result<Self::Textured, String> {
+        let eta = checked_ior(params.eta)?;
+        let eta = if Principled::transmits(params) { away_from_one(eta) } else { eta };
+        Ok(Box::new(PrincipledParams { eta, ..params.convert(binder) }))
+    }
+
+    fn at(textured: &Self::Textured, point: &SurfacePoint) -> Principled {
+        textured.convert(&mut PointLookup(point))
+    }
+
+    fn transmits(params: &PrincipledParams) -> bool {
+        params.spec_trans != ScalarDesc::Constant(0.0)
+    }
+
+    fn is_oriented(params: &PrincipledParams) -> bool {
+        params.anisotropic != ScalarDesc::Constant(0.0)
+    }
+
+    fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
         let front = a.z > 0.0;
-        if a.z * b.z == 0.0 || !(front || self.transmits()) {
+        if a.z * b.z == 0.0 || !(front || self.refracts()) {
             return (Rgb::BLACK, 0.0);
         }
         let shares = self.shares(front);
@@ -182,32 +212,20 @@ impl Principled {
         (value, pdf)
     }
 
-    fn coat_eval_pdf(&self, a: Vec3, b: Vec3, i: &Interaction) -> (f32, f32) {
-        let d = self.coat_d(i.m.z);
-        let f = mix(0.04, 1.0, schlick_mix(i.a_m, self.eta));
-        let shadowing = Microfacets::new(Distribution::Ggx, COAT_SHADOWING_ALPHA, COAT_SHADOWING_ALPHA, true);
-        let g = shadowing.g1(a, i.m) * shadowing.g1(b, i.m);
-        (0.25 * self.clearcoat * f * d * g * b.z, d * i.m.z / (4.0 * i.b_m))
-    }
-
-    pub fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
-        self.eval_pdf(a, b).1
-    }
-
-    pub fn sample_direction(&self, a: Vec3, u: [f32; 3]) -> Option<Vec3> {
+    fn sample(&self, a: Vec3, u: [f32; 3]) -> Option<LobeSample> {
         let front = a.z > 0.0;
-        if a.z == 0.0 || !(front || self.transmits()) {
+        if a.z == 0.0 || !(front || self.refracts()) {
             return None;
         }
         let shares = self.shares(front);
         let (is_diffuse, rest) = choose(u[0], shares.diffuse);
         if is_diffuse {
-            return cosine_above(a, u);
+            return cosine_above(a, u).map(LobeSample::Smooth);
         }
         let (is_coat, rest) = choose(rest, shares.coat / (1.0 - shares.diffuse));
         if is_coat {
             let b = reflect(a, self.sample_coat([u[1], u[2]]));
-            return (b.z > 0.0).then_some(b);
+            return (b.z > 0.0).then_some(LobeSample::Smooth(b));
         }
         let m = self.facets().sample(a * a.z.signum(), [u[1], u[2]]);
         if a.dot(m) * a.z <= 0.0 {
@@ -216,28 +234,27 @@ impl Principled {
         let interface = dielectric(a.dot(m), self.eta);
         if choose(rest, self.reflects_share(front, interface.reflectance)).0 {
             let b = reflect(a, m);
-            (b.z * a.z > 0.0).then_some(b)
+            (b.z * a.z > 0.0).then_some(LobeSample::Smooth(b))
         } else {
             let b = refract(a, m, &interface).try_normalize()?;
-            (b.z * a.z < 0.0).then_some(b)
+            (b.z * a.z < 0.0).then_some(LobeSample::Smooth(b))
         }
     }
 
-    /// Burley 2012, appendix B, eq. 5.
-    fn sample_coat(&self, u: [f32; 2]) -> Vec3 {
-        let a2 = self.coat_alpha() * self.coat_alpha();
-        let cos2 = ((1.0 - a2.powf(1.0 - u[1])) / (1.0 - a2)).clamp(0.0, 1.0);
-        let (sin, cos) = (2.0 * PI * u[0]).sin_cos();
-        let r = (1.0 - cos2).sqrt();
-        Vec3::new(r * cos, r * sin, cos2.sqrt())
-    }
-
-    pub fn albedo(&self) -> Rgb {
+    fn albedo(&self) -> Rgb {
         let f0 = normal_incidence(self.eta);
         let specular = (self.tint() * f0).lerp(Rgb::grey(f0), 1.0 - self.spec_tint).map(schlick_average);
         let base = self.base_color * self.diffuse()
             + self.base_color.map(|c| c.max(0.0).sqrt()) * self.refraction()
             + self.base_color * self.metallic;
         base + specular * (1.0 - self.metallic) + Rgb::grey(0.05 * self.sheen * (1.0 - self.metallic))
+    }
+
+    fn eta(&self) -> f32 {
+        self.eta
+    }
+
+    fn is_one_sided(&self) -> bool {
+        !self.refracts()
     }
 }

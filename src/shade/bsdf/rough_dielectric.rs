@@ -1,17 +1,19 @@
 //! Frosted glass: reflection and refraction by microfacets (Walter et al. 2007, eqs. 20 and 21).
 
-use super::lobe::choose;
 use super::microfacet::Microfacets;
+use super::model::{LobeSample, Model, PointLookup, TextureBinder, Textured, away_from_one, checked_ior, choose};
 use crate::math::fresnel::{dielectric, normal_incidence, reflect, refract, schlick_average};
 use crate::math::{Rgb, Vec3};
+use crate::scene::RoughDielectricParams;
+use crate::shade::SurfacePoint;
 
 /// Rough glass.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RoughDielectric {
-    pub facets: Microfacets,
-    pub eta: f32,
-    pub reflectance: Rgb,
-    pub transmittance: Rgb,
+    facets: Microfacets,
+    eta: f32,
+    reflectance: Rgb,
+    transmittance: Rgb,
 }
 
 /// A facet that sends light between two directions, by reflection or refraction.
@@ -28,7 +30,8 @@ pub(super) struct Interaction {
 }
 
 impl Interaction {
-    /// The facet between `a` and `b` at an interface of index `eta`; `None` where surface and facet disagree about the sides.
+    /// The facet between `a` and `b` at an interface of index `eta`; `None` where surface and facet disagree about the
+    /// sides.
     pub fn new(a: Vec3, b: Vec3, eta: f32) -> Option<Interaction> {
         let reflects = a.z * b.z > 0.0;
         if !reflects && a.z * b.z >= 0.0 {
@@ -47,7 +50,7 @@ impl Interaction {
         (a_m * a.z > 0.0 && b_m * b.z > 0.0).then_some(Interaction { m, a_m, b_m, eta, reflects })
     }
 
-    /// |∂ω_m / ∂ω_b| / |a · m|: multiplies [`Microfacets::pdf_over_dot`] to the density of `b`.
+    /// |∂ω_m / ∂ω_b| / |a · m|: times [`Microfacets::pdf_over_dot`] it is the density of `b`.
     pub fn jacobian_times_dot(&self) -> f32 {
         if self.reflects {
             // 1 / (4 |b · m|) with a · m = b · m.
@@ -70,7 +73,44 @@ impl RoughDielectric {
         if self.facets.visible { self.facets } else { self.facets.scaled(1.2 - 0.2 * a.z.abs().sqrt()) }
     }
 
-    pub fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
+    fn facet_pdf(&self, a: Vec3, i: &Interaction) -> f32 {
+        let facets = self.sampled_facets(a);
+        let d = facets.d(i.m);
+        if d > 0.0 { facets.pdf_over_dot(a * a.z.signum(), i.m, d) * i.jacobian_times_dot() } else { 0.0 }
+    }
+}
+
+impl Model for RoughDielectric {
+    type Params = RoughDielectricParams;
+    type Textured = RoughDielectricParams<Textured>;
+
+    fn bind(
+        params: &RoughDielectricParams,
+        binder: &mut TextureBinder,
+    ) -> Result<RoughDielectricParams<Textured>, String> {
+        let eta = away_from_one(checked_ior(params.eta)?);
+        Ok(RoughDielectricParams { eta, ..params.convert(binder) })
+    }
+
+    fn at(textured: &RoughDielectricParams<Textured>, point: &SurfacePoint) -> RoughDielectric {
+        let params = textured.convert(&mut PointLookup(point));
+        RoughDielectric {
+            facets: Microfacets::from_roughness(&params.roughness),
+            eta: params.eta,
+            reflectance: params.specular_reflectance,
+            transmittance: params.specular_transmittance,
+        }
+    }
+
+    fn transmits(_: &RoughDielectricParams) -> bool {
+        true
+    }
+
+    fn is_oriented(params: &RoughDielectricParams) -> bool {
+        params.roughness.is_anisotropic()
+    }
+
+    fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
         let Some(i) = Interaction::new(a, b, self.eta) else {
             return (Rgb::BLACK, 0.0);
         };
@@ -85,13 +125,7 @@ impl RoughDielectric {
         (value, share * self.facet_pdf(a, &i))
     }
 
-    fn facet_pdf(&self, a: Vec3, i: &Interaction) -> f32 {
-        let facets = self.sampled_facets(a);
-        let d = facets.d(i.m);
-        if d > 0.0 { facets.pdf_over_dot(a * a.z.signum(), i.m, d) * i.jacobian_times_dot() } else { 0.0 }
-    }
-
-    pub fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
+    fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
         let Some(i) = Interaction::new(a, b, self.eta) else {
             return 0.0;
         };
@@ -99,27 +133,35 @@ impl RoughDielectric {
         (if i.reflects { f } else { 1.0 - f }) * self.facet_pdf(a, &i)
     }
 
-    pub fn sample_direction(&self, a: Vec3, u: [f32; 3]) -> Option<Vec3> {
+    fn sample(&self, a: Vec3, u: [f32; 3]) -> Option<LobeSample> {
         if a.z == 0.0 {
             return None;
         }
         let m = self.sampled_facets(a).sample(a * a.z.signum(), [u[1], u[2]]);
         if a.dot(m) * a.z <= 0.0 {
-            // Facets seen from behind: drawn where all normals are, not only the visible ones.
+            // The facet is seen from behind, which happens if all normals are sampled and not only the visible ones.
             return None;
         }
         let interface = dielectric(a.dot(m), self.eta);
         if choose(u[0], interface.reflectance).0 {
             let b = reflect(a, m);
-            (b.z * a.z > 0.0).then_some(b)
+            (b.z * a.z > 0.0).then_some(LobeSample::Smooth(b))
         } else {
             let b = refract(a, m, &interface).try_normalize()?;
-            (b.z * a.z < 0.0).then_some(b)
+            (b.z * a.z < 0.0).then_some(LobeSample::Smooth(b))
         }
     }
 
-    pub fn albedo(&self) -> Rgb {
+    fn albedo(&self) -> Rgb {
         let f = schlick_average(normal_incidence(self.eta));
         self.reflectance * f + self.transmittance * (1.0 - f)
+    }
+
+    fn eta(&self) -> f32 {
+        self.eta
+    }
+
+    fn is_one_sided(&self) -> bool {
+        false
     }
 }

@@ -1,13 +1,15 @@
-//! A rough coat over a diffuse base (the `roughplastic` of Mitsuba): microfacet reflection, and a base that is lit and seen through
-//! the rough interface, whose transmittance is tabulated over the cosine.
+//! A rough coat over a diffuse base (the `roughplastic` of Mitsuba): microfacet reflection, and a base that is lit and
+//! seen through the rough interface, whose transmittance is tabulated over the cosine.
 
 use super::diffuse::{cosine_above, cosine_pdf};
-use super::lobe::choose;
 use super::microfacet::{Microfacets, half_vector};
+use super::model::{LobeSample, Model, TextureBinder, away_from_one, checked_ior, choose};
 use super::plastic::{internal_scattering, specular_weight};
 use crate::math::fresnel::{dielectric, reflect, refract};
 use crate::math::{Rgb, Vec3};
-use crate::scene::Distribution;
+use crate::scene::{Convert, Distribution, RoughPlasticParams};
+use crate::shade::SurfacePoint;
+use crate::shade::texture::ColorTexture;
 use std::sync::{Mutex, PoisonError};
 
 /// A rough coat over a diffuse base.
@@ -25,9 +27,9 @@ pub(super) struct RoughPlastic {
 /// Samples of the tabulated transmittance, at cosines 0, 1/63, … 1.
 const TABLE: usize = 64;
 
-/// What the rough interface lets through.
+/// Transmittance of a rough interface.
 #[derive(Debug)]
-pub(super) struct Coat {
+struct Coat {
     key: (Distribution, u32, u32),
     transmittance: [f32; TABLE],
     /// Fraction of diffuse light from below that is reflected back.
@@ -37,9 +39,9 @@ pub(super) struct Coat {
 static COATS: Mutex<Vec<&'static Coat>> = Mutex::new(Vec::new());
 
 impl Coat {
-    /// The table of an interface. Tables are shared by the whole process and never freed: a point's BSDF refers to its table without
-    /// counting references, and there are as many (300 bytes each) as there are different coats.
-    pub fn get(distribution: Distribution, alpha: f32, eta: f32) -> &'static Coat {
+    /// The table of an interface. Tables are shared by the whole process and never freed: a point's BSDF refers to its
+    /// table without counting references, and there are as many (300 bytes each) as there are different coats.
+    fn get(distribution: Distribution, alpha: f32, eta: f32) -> &'static Coat {
         let key = (distribution, alpha.to_bits(), eta.to_bits());
         let mut coats = COATS.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(coat) = coats.iter().find(|c| c.key == key) {
@@ -64,8 +66,8 @@ impl Coat {
     }
 }
 
-/// Fraction of light from the direction of cosine `cos` that facets of relative index `eta` reflect (or transmit): the mean over visible
-/// normals of G1(b) F (or G1(b) (1 − F)), by a product Gauss–Legendre rule of `n`² nodes.
+/// Fraction of light from the direction of cosine `cos` that facets of relative index `eta` reflect (or transmit): the
+/// mean over visible normals of G1(b) F (or G1(b) (1 − F)), by a product Gauss–Legendre rule of `n`² nodes.
 fn directional(facets: &Microfacets, cos: f32, eta: f32, n: usize, reflects: bool) -> f32 {
     let a = Vec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
     let nodes = gauss_legendre(n);
@@ -114,26 +116,52 @@ fn gauss_legendre(n: usize) -> Vec<(f32, f32)> {
         .collect()
 }
 
-impl RoughPlastic {
-    pub fn new(
-        facets: Microfacets,
-        coat: &'static Coat,
-        eta: f32,
-        diffuse: Rgb,
-        specular: Rgb,
-        nonlinear: bool,
-    ) -> RoughPlastic {
-        let base = internal_scattering(diffuse, coat.internal_reflectance, nonlinear) / (eta * eta);
-        RoughPlastic { facets, eta, base, specular, specular_weight: specular_weight(diffuse, specular), coat }
-    }
+/// A rough coat over a diffuse base, with its textures and the table of its interface.
+#[derive(Debug)]
+pub(super) struct TexturedRoughPlastic {
+    facets: Microfacets,
+    coat: &'static Coat,
+    eta: f32,
+    diffuse: ColorTexture,
+    specular: ColorTexture,
+    nonlinear: bool,
+}
 
+impl RoughPlastic {
     fn specular_probability(&self, transmittance: f32) -> f32 {
         let s = (1.0 - transmittance) * self.specular_weight;
         let d = transmittance * (1.0 - self.specular_weight);
         if s + d > 0.0 { s / (s + d) } else { 0.0 }
     }
+}
 
-    pub fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
+impl Model for RoughPlastic {
+    type Params = RoughPlasticParams;
+    type Textured = TexturedRoughPlastic;
+
+    fn bind(params: &RoughPlasticParams, binder: &mut TextureBinder) -> Result<TexturedRoughPlastic, String> {
+        let eta = away_from_one(checked_ior(params.eta)?);
+        let roughness = params.roughness;
+        // The coat's table is for one roughness; a texture counts by its mean (Mitsuba takes numbers only).
+        let alpha = binder.textures.scalar(roughness.alpha_u).mean();
+        Ok(TexturedRoughPlastic {
+            facets: Microfacets::new(roughness.distribution, alpha, alpha, roughness.sample_visible),
+            coat: Coat::get(roughness.distribution, alpha, eta),
+            eta,
+            diffuse: binder.color(&params.diffuse_reflectance),
+            specular: binder.color(&params.specular_reflectance),
+            nonlinear: params.nonlinear,
+        })
+    }
+
+    fn at(textured: &TexturedRoughPlastic, point: &SurfacePoint) -> RoughPlastic {
+        let &TexturedRoughPlastic { facets, coat, eta, nonlinear, .. } = textured;
+        let (diffuse, specular) = (textured.diffuse.eval(point), textured.specular.eval(point));
+        let base = internal_scattering(diffuse, coat.internal_reflectance, nonlinear) / (eta * eta);
+        RoughPlastic { facets, eta, base, specular, specular_weight: specular_weight(diffuse, specular), coat }
+    }
+
+    fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
         if a.z <= 0.0 || b.z <= 0.0 {
             return (Rgb::BLACK, 0.0);
         }
@@ -149,7 +177,7 @@ impl RoughPlastic {
         (value, pdf)
     }
 
-    pub fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
+    fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
         if a.z <= 0.0 || b.z <= 0.0 {
             return 0.0;
         }
@@ -158,20 +186,20 @@ impl RoughPlastic {
         p * facet + (1.0 - p) * cosine_pdf(b)
     }
 
-    pub fn sample_direction(&self, a: Vec3, u: [f32; 3]) -> Option<Vec3> {
+    fn sample(&self, a: Vec3, u: [f32; 3]) -> Option<LobeSample> {
         if a.z <= 0.0 {
             return None;
         }
         let p = self.specular_probability(self.coat.transmittance(a.z));
         if choose(u[0], p).0 {
             let b = reflect(a, self.facets.sample(a, [u[1], u[2]]));
-            (b.z > 0.0).then_some(b)
+            (b.z > 0.0).then_some(LobeSample::Smooth(b))
         } else {
-            cosine_above(a, u)
+            cosine_above(a, u).map(LobeSample::Smooth)
         }
     }
 
-    pub fn albedo(&self) -> Rgb {
+    fn albedo(&self) -> Rgb {
         // The middle of the table stands for the mean over the hemisphere.
         let t = self.coat.transmittance(2.0 / 3.0);
         self.specular * (1.0 - t) + self.base * (t * t)

@@ -12,27 +12,30 @@ fn messages(bsdfs: Vec<BsdfKind>) -> (MaterialSet, Vec<String>) {
 }
 
 fn grey() -> BsdfKind {
-    BsdfKind::Diffuse { reflectance: rgb(0.2, 0.2, 0.2) }
+    DiffuseParams { reflectance: rgb(0.2, 0.2, 0.2) }.into()
 }
 
 #[test]
 fn impossible_trees_are_errors_and_render_as_the_default() {
     let blend = |a, b| BsdfKind::Blend { weight: num(0.5), a: BsdfId(a), b: BsdfId(b) };
-    let glass = BsdfKind::Dielectric { eta: 1.5, specular_reflectance: white(), specular_transmittance: white() };
+    let glass = DielectricParams { eta: 1.5, specular_reflectance: white(), specular_transmittance: white() };
     let cases: Vec<(Vec<BsdfKind>, &str)> = vec![
         (vec![blend(0, 0)], "nested in itself"),
         (vec![blend(7, 7)], "does not exist"),
         (vec![grey(), blend(0, 0), blend(1, 1), blend(2, 2), blend(3, 3)], "16 lobes"),
-        (vec![glass, BsdfKind::TwoSided { front: BsdfId(0), back: BsdfId(0) }], "two-sided"),
+        (vec![glass.into(), BsdfKind::TwoSided { front: BsdfId(0), back: BsdfId(0) }], "two-sided"),
         (vec![grey(), BsdfKind::BumpMap { nested: BsdfId(0), height: TextureId(3), scale: 1.0 }], "height map"),
         (vec![grey(), BsdfKind::NormalMap { nested: BsdfId(0), normals: TextureId(3) }], "normal map"),
         (
-            vec![BsdfKind::Plastic {
-                eta: -1.0,
-                diffuse_reflectance: white(),
-                specular_reflectance: white(),
-                nonlinear: false,
-            }],
+            vec![
+                PlasticParams {
+                    eta: -1.0,
+                    diffuse_reflectance: white(),
+                    specular_reflectance: white(),
+                    nonlinear: false,
+                }
+                .into(),
+            ],
             "not positive",
         ),
     ];
@@ -70,9 +73,60 @@ fn features_say_what_a_material_can_do() {
     assert!(of("mask").passes_through && !of("mask").opaque() && of("mask").two_sided);
     assert!(of("bump_diffuse").textured && of("bump_diffuse").tilted);
     assert!(of("principled_glass").transmissive && !of("principled_opaque").transmissive);
-    let (set, _) = messages(vec![BsdfKind::Diffuse { reflectance: rgb(0.0, 0.0, 0.0) }]);
+    let (set, _) = messages(vec![DiffuseParams { reflectance: rgb(0.0, 0.0, 0.0) }.into()]);
     assert!(set.get(Some(BsdfId(0))).is_black() && !set.get(None).is_black());
     assert!(!ZOO.get("mask").is_black());
+}
+
+/// The events that a material shows from one side of a flat point.
+#[derive(Default)]
+struct Observed {
+    smooth: bool,
+    delta: bool,
+    /// Light goes to the other side.
+    crosses: bool,
+}
+
+fn observe(material: &Material, wo: Vec3) -> Observed {
+    let (mut rng, mut seen) = (HashRng::new(21, 0, 0, 0), Observed::default());
+    let bsdf = material.resolve(&flat(), wo);
+    for s in (0..500).filter_map(|_| bsdf.sample(wo, next3(&mut rng), Transport::Radiance)) {
+        (seen.smooth, seen.delta) = (seen.smooth || !s.delta, seen.delta || s.delta);
+        seen.crosses |= s.wi.z * wo.z < 0.0;
+    }
+    seen
+}
+
+/// The features of every model of the table are those that its samples and values show.
+#[test]
+fn features_of_all_models_agree_with_their_behaviour() {
+    let (wo, wi) = (Vec3::new(0.3, 0.1, 0.8).normalize(), Vec3::new(-0.1, 0.25, 0.9).normalize());
+    let quarter_turn = SurfacePoint { frame: Frame { s: Vec3::Y, t: -Vec3::X, n: Vec3::Z }, ..flat() };
+    let value = |material: &Material, p: &SurfacePoint| material.resolve(p, wo).eval(wo, wi, Transport::Radiance);
+    for model in MODELS {
+        for variant in ["default", "textured", "varied"] {
+            let name = format!("{} {variant}", model.name);
+            let material = ZOO.get(&name);
+            let f = material.features();
+            let (front, back) = (observe(material, wo), observe(material, -wo));
+            assert_eq!((f.smooth, f.delta, f.transmissive), (front.smooth, front.delta, front.crosses), "{name}");
+            assert_eq!(f.two_sided, back.smooth || back.delta, "{name}");
+            assert_eq!(f.textured, variant == "textured", "{name}");
+            assert!(!f.tilted && !f.passes_through && !material.is_black(), "{name}");
+            assert_eq!(f.oriented, value(material, &flat()) != value(material, &quarter_turn), "{name}");
+        }
+    }
+}
+
+#[test]
+fn operators_hand_features_on() {
+    let oriented = |name: &str| ZOO.get(name).features().oriented;
+    for name in ["rough_conductor_ggx", "two_sided_bump", "bump_diffuse", "normal_map", "blend_mask"] {
+        assert!(oriented(name), "{name}");
+    }
+    for name in ["two_sided", "blend", "mask", "mask_two_sided", "rough_conductor_beckmann"] {
+        assert!(!oriented(name), "{name}");
+    }
 }
 
 #[test]

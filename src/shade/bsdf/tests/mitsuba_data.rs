@@ -22,7 +22,7 @@ pub const PAIRS: [([f32; 3], [f32; 3]); 10] = [
     ([-0.7, 0.6, 0.25], [0.5, -0.6, 0.4]),
 ];
 
-/// Of each material a row for every pair.
+/// A row for every pair, of each material.
 #[rustfmt::skip]
 pub const TABLE: &[(&str, &[Row])] = &[
     ("diffuse", &[

@@ -17,17 +17,17 @@ use std::sync::{Arc, LazyLock};
 /// Named materials.
 pub struct Zoo {
     set: MaterialSet,
-    names: Vec<(&'static str, BsdfId)>,
+    names: Vec<(String, BsdfId)>,
 }
 
 impl Zoo {
     pub fn get(&self, name: &str) -> &Material {
-        let (_, id) = self.names.iter().find(|(n, _)| *n == name).unwrap_or_else(|| panic!("no material {name}"));
+        let (_, id) = self.names.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("no material {name}"));
         self.set.get(Some(*id))
     }
 
-    pub fn all(&self) -> impl Iterator<Item = (&'static str, &Material)> {
-        self.names.iter().map(|(n, id)| (*n, self.set.get(Some(*id))))
+    pub fn all(&self) -> impl Iterator<Item = (&str, &Material)> {
+        self.names.iter().map(|(n, id)| (n.as_str(), self.set.get(Some(*id))))
     }
 }
 
@@ -43,31 +43,85 @@ pub fn num(v: f32) -> ScalarDesc {
     ScalarDesc::Constant(v)
 }
 
-pub fn rough(distribution: Distribution, u: f32, v: f32, sample_visible: bool) -> RoughnessDesc {
-    RoughnessDesc { distribution, alpha_u: num(u), alpha_v: num(v), sample_visible }
+pub fn rough(distribution: Distribution, u: f32, v: f32, sample_visible: bool) -> Roughness {
+    Roughness { distribution, alpha_u: num(u), alpha_v: num(v), sample_visible }
 }
 
-pub fn gold(roughness: RoughnessDesc, tint: ColorDesc) -> BsdfKind {
-    BsdfKind::RoughConductor { roughness, eta: rgb(0.2, 0.4, 1.3), k: rgb(3.9, 2.4, 1.8), specular_reflectance: tint }
+const GOLD: ComplexIor =
+    ComplexIor { eta: ColorDesc::Constant(Rgb::new(0.2, 0.4, 1.3)), k: ColorDesc::Constant(Rgb::new(3.9, 2.4, 1.8)) };
+
+pub fn gold(roughness: Roughness, tint: ColorDesc) -> RoughConductorParams {
+    RoughConductorParams { roughness, ior: GOLD, specular_reflectance: tint }
 }
 
-pub fn principled(f: impl FnOnce(&mut PrincipledDesc)) -> BsdfKind {
-    let mut p = PrincipledDesc {
-        base_color: rgb(0.7, 0.4, 0.2),
-        roughness: num(0.5),
-        anisotropic: num(0.0),
-        metallic: num(0.0),
-        spec_trans: num(0.0),
-        eta: 1.5,
-        spec_tint: num(0.0),
-        sheen: num(0.0),
-        sheen_tint: num(0.0),
-        flatness: num(0.0),
-        clearcoat: num(0.0),
-        clearcoat_gloss: num(0.0),
-    };
+/// Principled parameters: a plain base, changed by `f`.
+pub fn principled(f: impl FnOnce(&mut PrincipledParams)) -> PrincipledParams {
+    let mut p = PrincipledParams::read(&mut TestParams::Default);
+    p.base_color = rgb(0.7, 0.4, 0.2);
     f(&mut p);
-    BsdfKind::Principled(Box::new(p))
+    p
+}
+
+/// Refractive index of all models that are read from [`TestParams`].
+pub const TEST_IOR: f32 = 1.5;
+
+/// Parameters for any model of the table.
+pub enum TestParams {
+    /// Every parameter has its default.
+    Default,
+    /// Every colour and number comes from the given texture.
+    Textured(TextureId),
+    /// Every number is constant and below the one before, starting below the given one.
+    Varied(f32),
+}
+
+impl ParamSource for TestParams {
+    fn color(&mut self, _: &'static str, default: f32) -> ColorDesc {
+        match self {
+            TestParams::Textured(id) => ColorDesc::Texture(*id),
+            _ => ColorDesc::Constant(Rgb::grey(default)),
+        }
+    }
+
+    fn scalar(&mut self, _: &'static str, default: f32) -> ScalarDesc {
+        match self {
+            TestParams::Default => num(default),
+            TestParams::Textured(id) => ScalarDesc::Texture(*id),
+            TestParams::Varied(next) => {
+                *next -= 0.06;
+                num(*next)
+            }
+        }
+    }
+
+    fn flag(&mut self, _: &'static str, default: bool) -> bool {
+        default
+    }
+
+    fn relative_ior(&mut self, _: f64) -> f32 {
+        TEST_IOR
+    }
+
+    fn principled_ior(&mut self) -> f32 {
+        TEST_IOR
+    }
+
+    fn complex_ior(&mut self) -> ComplexIor {
+        match self {
+            TestParams::Textured(id) => ComplexIor { eta: ColorDesc::Texture(*id), k: ColorDesc::Texture(*id) },
+            _ => GOLD,
+        }
+    }
+
+    fn roughness(&mut self) -> Roughness {
+        // Wide enough for the numerical integrals of densities.
+        let (alpha_u, alpha_v) = (self.scalar("alpha_u", 0.4), self.scalar("alpha_v", 0.4));
+        Roughness { distribution: Distribution::Beckmann, alpha_u, alpha_v, sample_visible: true }
+    }
+
+    fn ward_variant(&mut self, _: &'static str, default: WardVariant) -> WardVariant {
+        default
+    }
 }
 
 pub fn float_image(width: u32, height: u32, channels: u32, values: &[f32]) -> ImageDesc {
@@ -88,7 +142,7 @@ pub fn bitmap(image: u32) -> TextureDesc {
 /// Builds materials; panics on any diagnostic.
 pub struct ZooBuilder {
     pub bsdfs: Vec<BsdfDesc>,
-    names: Vec<(&'static str, BsdfId)>,
+    names: Vec<(String, BsdfId)>,
 }
 
 impl ZooBuilder {
@@ -96,15 +150,29 @@ impl ZooBuilder {
         ZooBuilder { bsdfs: Vec::new(), names: Vec::new() }
     }
 
-    pub fn add(&mut self, kind: BsdfKind) -> BsdfId {
-        self.bsdfs.push(BsdfDesc { name: None, kind, span: None });
+    pub fn add(&mut self, kind: impl Into<BsdfKind>) -> BsdfId {
+        self.bsdfs.push(BsdfDesc { name: None, kind: kind.into(), span: None });
         BsdfId(self.bsdfs.len() as u32 - 1)
     }
 
-    pub fn name(&mut self, name: &'static str, kind: BsdfKind) -> BsdfId {
+    pub fn name(&mut self, name: impl Into<String>, kind: impl Into<BsdfKind>) -> BsdfId {
         let id = self.add(kind);
-        self.names.push((name, id));
+        self.names.push((name.into(), id));
         id
+    }
+
+    /// Every model of the table, named after it: with default, textured and varied parameters.
+    pub fn models(&mut self, texture: TextureId) {
+        for model in MODELS {
+            let sources = [
+                ("default", TestParams::Default),
+                ("textured", TestParams::Textured(texture)),
+                ("varied", TestParams::Varied(0.9)),
+            ];
+            for (variant, mut params) in sources {
+                self.name(format!("{} {variant}", model.name), BsdfKind::Model((model.read)(&mut params)));
+            }
+        }
     }
 
     pub fn build(self, textures: &[TextureDesc], images: &[ImageDesc]) -> Zoo {
@@ -120,9 +188,9 @@ impl ZooBuilder {
 pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     use Distribution::{Beckmann, Ggx};
     let mut z = ZooBuilder::new();
-    let orange = || BsdfKind::Diffuse { reflectance: rgb(0.8, 0.4, 0.1) };
+    let orange = || DiffuseParams { reflectance: rgb(0.8, 0.4, 0.1) };
     let tints = (rgb(0.9, 0.8, 0.7), rgb(0.5, 0.6, 0.9));
-    let glass = |roughness, eta, (specular_reflectance, specular_transmittance)| BsdfKind::RoughDielectric {
+    let glass = |roughness, eta, (specular_reflectance, specular_transmittance)| RoughDielectricParams {
         roughness,
         eta,
         specular_reflectance,
@@ -130,18 +198,9 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     };
     let brown = rgb(0.6, 0.3, 0.1);
     let diffuse = z.name("diffuse", orange());
-    z.name(
-        "dielectric",
-        BsdfKind::Dielectric { eta: 1.5, specular_reflectance: tints.0, specular_transmittance: tints.1 },
-    );
-    z.name(
-        "thin",
-        BsdfKind::ThinDielectric { eta: 1.5, specular_reflectance: tints.0, specular_transmittance: tints.1 },
-    );
-    let polished = z.name(
-        "conductor",
-        BsdfKind::Conductor { eta: rgb(0.2, 0.4, 1.3), k: rgb(3.9, 2.4, 1.8), specular_reflectance: white() },
-    );
+    z.name("dielectric", DielectricParams { eta: 1.5, specular_reflectance: tints.0, specular_transmittance: tints.1 });
+    z.name("thin", ThinDielectricParams { eta: 1.5, specular_reflectance: tints.0, specular_transmittance: tints.1 });
+    let polished = z.name("conductor", ConductorParams { ior: GOLD, specular_reflectance: white() });
     z.name("rough_conductor_ggx", gold(rough(Ggx, 0.3, 0.1, true), tints.0));
     z.name("rough_conductor_beckmann", gold(rough(Beckmann, 0.4, 0.4, true), white()));
     z.name("rough_conductor_all_normals", gold(rough(Beckmann, 0.25, 0.25, false), white()));
@@ -149,12 +208,12 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     z.name("rough_dielectric_beckmann", glass(rough(Beckmann, 0.5, 0.5, true), 1.33, (white(), white())));
     z.name("rough_dielectric_all_normals", glass(rough(Ggx, 0.3, 0.3, false), 1.5, (white(), white())));
     for (name, eta, nonlinear) in [("plastic", 1.49, false), ("plastic_nonlinear", 1.9, true)] {
-        let kind = BsdfKind::Plastic { eta, diffuse_reflectance: brown, specular_reflectance: white(), nonlinear };
+        let kind = PlasticParams { eta, diffuse_reflectance: brown, specular_reflectance: white(), nonlinear };
         z.name(name, kind);
     }
     z.name(
         "rough_plastic_ggx",
-        BsdfKind::RoughPlastic {
+        RoughPlasticParams {
             roughness: rough(Ggx, 0.2, 0.2, true),
             eta: 1.49,
             diffuse_reflectance: brown,
@@ -164,7 +223,7 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     );
     z.name(
         "rough_plastic_beckmann",
-        BsdfKind::RoughPlastic {
+        RoughPlasticParams {
             roughness: rough(Beckmann, 0.4, 0.4, true),
             eta: 1.7,
             diffuse_reflectance: brown,
@@ -202,7 +261,7 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     );
     z.name(
         "phong",
-        BsdfKind::Phong {
+        PhongParams {
             exponent: num(12.0),
             specular_reflectance: rgb(0.5, 0.3, 0.2),
             diffuse_reflectance: rgb(0.2, 0.3, 0.4),
@@ -211,7 +270,7 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     for (name, variant) in
         [("ward", WardVariant::Ward), ("ward_duer", WardVariant::WardDuer), ("ward_balanced", WardVariant::Balanced)]
     {
-        let kind = BsdfKind::Ward {
+        let kind = WardParams {
             alpha_u: num(0.2),
             alpha_v: num(0.4),
             variant,
@@ -240,6 +299,7 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     z.name("bump_two_sided", bump(brushed_both));
     z.name("bump_bump", bump(bumped));
     z.name("bump_mirror", bump(polished));
+    z.models(TextureId(0));
     let height = float_image(3, 2, 1, &[0.1, 0.5, 0.3, 0.7, 0.2, 0.9]);
     let normals = float_image(2, 2, 3, &[0.6, 0.55, 0.9, 0.3, 0.5, 0.8, 0.5, 0.8, 0.85, 0.45, 0.2, 0.7]);
     z.build(&[bitmap(0), bitmap(1)], &[height, normals])

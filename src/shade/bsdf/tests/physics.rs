@@ -1,4 +1,4 @@
-//! What every model must obey: consistency of its functions, reciprocity, the adjoint, energy, finite numbers.
+//! Laws that every model must obey: consistency of its functions, reciprocity, the adjoint, energy, finite numbers.
 
 use super::*;
 use crate::shade::{Bsdf, BsdfPool, Transport};
@@ -68,14 +68,15 @@ fn densities_are_the_same_from_both_ends() {
         for (wo, wi) in pairs(material, &p, m as u64) {
             let here = material.resolve(&p, wo);
             let there = material.resolve(&p, wi);
-            let (forward, reverse) = here.pdf_both(wo, wi, Transport::Radiance);
+            let forward = here.pdf(wo, wi, Transport::Radiance);
+            let reverse = here.pdf(wi, wo, Transport::Importance);
             let (value, pdf) = here.eval_and_pdf(wo, wi, Transport::Radiance);
             assert!(close(forward.0, pdf.0, 1e-4), "{name}");
             assert_eq!(forward, here.pdf(wo, wi, Transport::Importance), "{name}");
             let seen_there = there.pdf(wi, wo, Transport::Importance);
             assert!(close(reverse.0, seen_there.0, 1e-4), "{name} {wo} {wi}: {reverse:?} {seen_there:?}");
             assert!(close_rgb(here.albedo(), there.albedo(), 1e-5) || !material.features().transmissive, "{name}");
-            // Where light goes, the walk can go (tilted normals may be seen differently from both ends).
+            // Directions that carry light have a density (tilted normals may be seen differently from both ends).
             assert!(value.is_black() || pdf.0 > 0.0 || tilted(material), "{name} {wo} {wi} {value:?}");
         }
     }
@@ -86,7 +87,7 @@ fn crossed_eta(name: &str, a: f32, b: f32) -> f32 {
     let eta = match name {
         "rough_dielectric_beckmann" => 1.33,
         "principled_glass" => 1.4,
-        _ => 1.5,
+        _ => TEST_IOR,
     };
     if a * b > 0.0 {
         1.0
@@ -125,7 +126,7 @@ fn importance_is_the_adjoint_of_radiance() {
                 continue;
             }
             let importance = material.resolve(&p, wo).eval(wo, wi, Transport::Importance);
-            // What a camera walk in the other direction sees, with the cosine exchanged (Veach 1997, §5.3).
+            // Value for a camera walk in the other direction, with the cosine exchanged (Veach 1997, §5.3).
             let radiance = material.resolve(&p, wi).eval(wi, wo, Transport::Radiance);
             assert!(close_rgb(importance, radiance * (ig / og), 2e-3), "{name} {wo} {wi}: {importance:?} {radiance:?}");
             if !tilted(material) {
@@ -176,7 +177,7 @@ fn discrete_events_can_be_reversed() {
     }
 }
 
-/// Mean throughput of importance from `wo`: the share of the energy that leaves.
+/// Mean throughput of importance from `wo`: the fraction of the energy that leaves.
 fn reflected(bsdf: &Bsdf, wo: Vec3, seed: u64) -> Rgb {
     let mut rng = HashRng::new(13, seed, 0, 0);
     let n = 4000;
@@ -189,22 +190,12 @@ fn reflected(bsdf: &Bsdf, wo: Vec3, seed: u64) -> Rgb {
 fn white_materials_create_no_energy() {
     use Distribution::{Beckmann, Ggx};
     let mut z = ZooBuilder::new();
-    let mirror = |roughness| BsdfKind::RoughConductor {
-        roughness,
-        eta: rgb(0.0, 0.0, 0.0),
-        k: white(),
-        specular_reflectance: white(),
-    };
-    let diffuse = z.name("diffuse", BsdfKind::Diffuse { reflectance: white() });
-    z.name("conductor", BsdfKind::Conductor { eta: rgb(0.0, 0.0, 0.0), k: white(), specular_reflectance: white() });
-    z.name(
-        "dielectric",
-        BsdfKind::Dielectric { eta: 1.5, specular_reflectance: white(), specular_transmittance: white() },
-    );
-    z.name(
-        "thin",
-        BsdfKind::ThinDielectric { eta: 1.5, specular_reflectance: white(), specular_transmittance: white() },
-    );
+    let ior = ComplexIor { eta: rgb(0.0, 0.0, 0.0), k: white() };
+    let mirror = |roughness| RoughConductorParams { roughness, ior, specular_reflectance: white() };
+    let diffuse = z.name("diffuse", DiffuseParams { reflectance: white() });
+    z.name("conductor", ConductorParams { ior, specular_reflectance: white() });
+    z.name("dielectric", DielectricParams { eta: 1.5, specular_reflectance: white(), specular_transmittance: white() });
+    z.name("thin", ThinDielectricParams { eta: 1.5, specular_reflectance: white(), specular_transmittance: white() });
     for (name, distribution, alpha) in [
         ("ggx 0.05", Ggx, 0.05),
         ("ggx 0.6", Ggx, 0.6),
@@ -215,7 +206,7 @@ fn white_materials_create_no_energy() {
         z.name(name, mirror(roughness));
         z.name(
             name,
-            BsdfKind::RoughDielectric {
+            RoughDielectricParams {
                 roughness,
                 eta: 1.5,
                 specular_reflectance: white(),
@@ -224,7 +215,7 @@ fn white_materials_create_no_energy() {
         );
         z.name(
             name,
-            BsdfKind::RoughPlastic {
+            RoughPlasticParams {
                 roughness,
                 eta: 1.5,
                 diffuse_reflectance: white(),
@@ -235,15 +226,12 @@ fn white_materials_create_no_energy() {
     }
     z.name(
         "plastic",
-        BsdfKind::Plastic { eta: 1.5, diffuse_reflectance: white(), specular_reflectance: white(), nonlinear: false },
+        PlasticParams { eta: 1.5, diffuse_reflectance: white(), specular_reflectance: white(), nonlinear: false },
     );
-    z.name(
-        "phong",
-        BsdfKind::Phong { exponent: num(20.0), specular_reflectance: white(), diffuse_reflectance: white() },
-    );
+    z.name("phong", PhongParams { exponent: num(20.0), specular_reflectance: white(), diffuse_reflectance: white() });
     z.name(
         "ward",
-        BsdfKind::Ward {
+        WardParams {
             alpha_u: num(0.2),
             alpha_v: num(0.4),
             variant: WardVariant::Balanced,
@@ -266,7 +254,7 @@ fn white_materials_create_no_energy() {
             assert!(energy.max_component() <= 1.02, "{name} {wo} {energy:?}");
         }
     }
-    // What loses nothing at all.
+    // Materials that lose no energy.
     let up = Vec3::new(0.4, 0.0, 0.8).normalize();
     for name in ["diffuse", "conductor", "dielectric", "thin"] {
         let energy = reflected(&zoo.get(name).resolve(&flat(), up), up, 1);
@@ -286,7 +274,7 @@ fn nothing_is_ever_non_finite() {
             z.name("conductor", gold(roughness, white()));
             z.name(
                 "glass",
-                BsdfKind::RoughDielectric {
+                RoughDielectricParams {
                     roughness,
                     eta: 1.0,
                     specular_reflectance: zero,
@@ -295,7 +283,7 @@ fn nothing_is_ever_non_finite() {
             );
             z.name(
                 "glass",
-                BsdfKind::RoughDielectric {
+                RoughDielectricParams {
                     roughness,
                     eta: 0.6,
                     specular_reflectance: white(),
@@ -305,7 +293,7 @@ fn nothing_is_ever_non_finite() {
         }
         z.name(
             "rough plastic",
-            BsdfKind::RoughPlastic {
+            RoughPlasticParams {
                 roughness: rough(distribution, 0.0, 0.0, true),
                 eta: 1.5,
                 diffuse_reflectance: zero,
@@ -315,11 +303,11 @@ fn nothing_is_ever_non_finite() {
         );
     }
     for eta in [0.7, 1.0, 3.0] {
-        z.name("dielectric", BsdfKind::Dielectric { eta, specular_reflectance: zero, specular_transmittance: white() });
-        z.name("thin", BsdfKind::ThinDielectric { eta, specular_reflectance: zero, specular_transmittance: zero });
+        z.name("dielectric", DielectricParams { eta, specular_reflectance: zero, specular_transmittance: white() });
+        z.name("thin", ThinDielectricParams { eta, specular_reflectance: zero, specular_transmittance: zero });
         z.name(
             "plastic",
-            BsdfKind::Plastic { eta, diffuse_reflectance: zero, specular_reflectance: zero, nonlinear: false },
+            PlasticParams { eta, diffuse_reflectance: zero, specular_reflectance: zero, nonlinear: false },
         );
     }
     for (roughness, trans) in [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
@@ -335,7 +323,7 @@ fn nothing_is_ever_non_finite() {
     for variant in [WardVariant::Ward, WardVariant::WardDuer, WardVariant::Balanced] {
         z.name(
             "ward",
-            BsdfKind::Ward {
+            WardParams {
                 alpha_u: num(0.0),
                 alpha_v: num(0.5),
                 variant,
@@ -344,7 +332,7 @@ fn nothing_is_ever_non_finite() {
             },
         );
     }
-    z.name("phong", BsdfKind::Phong { exponent: num(1e5), specular_reflectance: white(), diffuse_reflectance: zero });
+    z.name("phong", PhongParams { exponent: num(1e5), specular_reflectance: white(), diffuse_reflectance: zero });
     let extra = z.build(&[], &[]);
     let tiny = 1e-7f32;
     let mut directions: Vec<Vec3> = vec![Vec3::Z, -Vec3::Z, Vec3::X, Vec3::Y, -Vec3::X];
@@ -367,7 +355,7 @@ fn nothing_is_ever_non_finite() {
                         let valid = |x: f32| x.is_finite() && x >= 0.0;
                         assert!(value.to_array().into_iter().all(valid), "{name} {wo} {wi} {mode:?} {value:?}");
                         assert!(valid(pdf.0), "{name} {wo} {wi} {pdf:?}");
-                        let (forward, reverse) = bsdf.pdf_both(wo, wi, mode);
+                        let (forward, reverse) = (bsdf.pdf(wo, wi, mode), bsdf.pdf(wi, wo, mode));
                         assert!(valid(forward.0) && valid(reverse.0), "{name} {wo} {wi} {forward:?} {reverse:?}");
                     }
                     for &u in &numbers {
@@ -387,7 +375,7 @@ fn nothing_is_ever_non_finite() {
 }
 
 #[test]
-fn what_a_pool_keeps_is_the_same() {
+fn stored_bsdfs_equal_the_original() {
     let (mut first, mut second, mut stored) = (BsdfPool::default(), BsdfPool::default(), vec![]);
     let p = point(Vec3::new(0.2, 0.1, 1.0), Vec3::Z);
     for (_, material) in ZOO.all() {
