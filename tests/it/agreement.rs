@@ -7,10 +7,14 @@ use lightsieve::integrators::{importance, path};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
 use lightsieve::scene::{SceneDesc, ShapeDesc};
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// Samples per pixel and render; the error of most pixels is about one percent.
 const SPP: u64 = 64;
+/// Comparisons of one integrator that may fail at the first try. Of 10 to 24 comparisons of each integrator, two of `bdpt` do (the scene
+/// "instances", which fails against one and the same reference) and two of `importance-caching`, none of the others.
+const MAX_REPEATED: usize = 2;
 /// Renders that Mitsuba's means are made of.
 const MITSUBA_RENDERS: f64 = 32.0;
 
@@ -49,6 +53,8 @@ fn the_path_tracer_agrees_with_mitsuba() {
 
 #[test]
 fn every_integrator_agrees_with_the_path_tracer() {
+    // Comparisons of each integrator that failed at first, and the number of all of its comparisons.
+    let mut repeated: BTreeMap<&str, (Vec<String>, usize)> = BTreeMap::new();
     for name in GALLERY {
         let scene = prepared(exhibit(name));
         let power = [("heuristic", "power")];
@@ -63,8 +69,11 @@ fn every_integrator_agrees_with_the_path_tracer() {
                 // Virtual lights near a surface have no variance to judge by: 1/d² is all that they weigh.
                 let tolerance = if spec.name == "importance-caching" { 0.002 } else { 0.0 };
                 let picture = Picture::render(spec, &scene, &params, SPP, 250);
+                let (failed, compared) = repeated.entry(spec.name).or_default();
+                *compared += 1;
                 // So many comparisons fail by chance now and then. What is really different is so at four times the samples.
                 if let Some(difference) = picture.difference(&reference, tolerance) {
+                    failed.push(format!("{name} ({heuristic}): {difference}"));
                     let closer = Picture::render(spec, &scene, &params, 4 * SPP, 1250);
                     let reference = Picture::render(&path::SPEC, &scene, &power, 4 * SPP, 1100);
                     closer.assert_agrees(
@@ -75,6 +84,9 @@ fn every_integrator_agrees_with_the_path_tracer() {
                 }
             }
         }
+    }
+    for (integrator, (failed, compared)) in &repeated {
+        assert!(failed.len() <= MAX_REPEATED, "{integrator}: {} of {compared} failed at first: {failed:?}", failed.len());
     }
 }
 
@@ -92,19 +104,10 @@ fn backends_agree() {
 fn a_crop_is_a_part_of_the_picture() {
     for name in ["delta-lights", "environment", "lens", "room"] {
         let whole = prepared(exhibit(name));
-        let [x, y, width, height] = [2, 3, 5, 4];
-        let part = prepare(exhibit(name), Backend::default_available(), Some([x, y, width, height]));
+        let window = [2, 3, 5, 4];
+        let part = prepare(exhibit(name), Backend::default_available(), Some(window));
         for spec in unbiased().filter(|s| takes(s, &part)) {
-            let all = Picture::render(spec, &whole, &[], SPP, 500);
-            let cut: Vec<usize> =
-                (0..height).flat_map(|j| (0..width).map(move |i| ((y + j) * 8 + x + i) as usize)).collect();
-            let mut expected = Picture::exact(cut.iter().map(|&i| all.mean[i]).collect());
-            expected.variance = cut.iter().map(|&i| all.variance[i]).collect();
-            expected.freedom = all.freedom;
-            // An upper bound, as if the errors of all pixels were the same.
-            let n = cut.len() as f64;
-            let sum: f64 = expected.variance.iter().flatten().map(|v| v.sqrt()).sum();
-            expected.whole.1 = (sum / (3.0 * n)).powi(2);
+            let expected = Picture::render(spec, &whole, &[], SPP, 500).window(whole.film_size[0], window);
             let picture = Picture::render(spec, &part, &[], SPP, 600);
             picture.assert_agrees(&expected, 0.0, &format!("{}: {name}", spec.name));
         }

@@ -90,45 +90,45 @@ const WHITE: [(&str, &str); 9] = [
     ),
 ];
 
-/// Materials that lose some light by their nature (single scattering, a base under a coat), and the least that they return to
-/// the whole picture, of which they cover only a part. Burley's model is missing: it reflects more than it receives at grazing
-/// angles (1.07 where this cube shows most of that).
+/// Materials that lose some light by their nature (single scattering, a base under a coat), with the mean of the whole picture, of
+/// which they cover only a part: measured once with the path tracer, standard error below 0.001. Burley's model is missing: it
+/// reflects more than it receives at grazing angles (1.07 where this cube shows most of that).
 const OFF_WHITE: [(&str, &str, f64); 8] = [
-    ("rough glass", r#"<bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf>"#, 0.9),
+    ("rough glass", r#"<bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf>"#, 0.9455),
     (
         "rough glass, ggx",
         r#"<bsdf type="roughdielectric"><string name="distribution" value="ggx"/><float name="alpha" value="0.1"/></bsdf>"#,
-        0.95,
+        0.9674,
     ),
     (
         "rough mirror",
         r#"<bsdf type="roughconductor"><float name="alpha" value="0.4"/><rgb name="eta" value="0"/><rgb name="k" value="1"/></bsdf>"#,
-        0.9,
+        0.9640,
     ),
     (
         "plastic",
         r#"<bsdf type="plastic"><boolean name="nonlinear" value="true"/><rgb name="diffuse_reflectance" value="1"/></bsdf>"#,
-        0.95,
+        0.9997,
     ),
     (
         "rough plastic",
         r#"<bsdf type="roughplastic"><float name="alpha" value="0.2"/><boolean name="nonlinear" value="true"/><rgb name="diffuse_reflectance" value="1"/></bsdf>"#,
-        0.9,
+        0.9713,
     ),
     (
         "principled metal",
         r#"<bsdf type="principled"><rgb name="base_color" value="1"/><float name="metallic" value="1"/><float name="roughness" value="0.5"/></bsdf>"#,
-        0.9,
+        0.9483,
     ),
     (
         "phong",
         r#"<bsdf type="phong"><rgb name="specular_reflectance" value="0.4"/><rgb name="diffuse_reflectance" value="0.6"/></bsdf>"#,
-        0.8,
+        0.9310,
     ),
     (
         "ward",
         r#"<bsdf type="ward"><float name="alpha" value="0.3"/><rgb name="specular_reflectance" value="0.4"/><rgb name="diffuse_reflectance" value="0.6"/></bsdf>"#,
-        0.8,
+        0.9739,
     ),
 ];
 
@@ -155,7 +155,7 @@ fn white_materials_vanish_in_a_white_world() {
 
 #[test]
 fn no_material_makes_light() {
-    for (name, bsdf, least) in OFF_WHITE {
+    for (name, bsdf, known) in OFF_WHITE {
         let scene = prepare(parse(&open(bsdf), &[]), Backend::default_available(), None);
         for spec in unbiased().filter(|s| takes(s, &scene)) {
             let picture = Picture::render(spec, &scene, &[], 64, 1);
@@ -171,9 +171,9 @@ fn no_material_makes_light() {
             let (mean, variance) = picture.whole;
             let p = chance((mean, variance), (1.0, 0.0), (picture.freedom, f64::INFINITY), 0.0);
             assert!(mean <= 1.0 || 0.5 * p >= SIGNIFICANCE, "{}: {name}: {mean}, p = {p:e}", spec.name);
-            let (text, error) =
-                (format!("{}: {name}: {mean}, at least {least} was expected", spec.name), variance.sqrt());
-            assert!(mean > least - 4.0 * error && error < 0.05, "{text}");
+            let p = chance((mean, variance), (known, 0.0), (picture.freedom, f64::INFINITY), 0.002);
+            let text = format!("{}: {name}: {mean} ± {} instead of {known}, p = {p:e}", spec.name, variance.sqrt());
+            assert!(p >= SIGNIFICANCE && variance.sqrt() < 0.03, "{text}");
         }
     }
 }

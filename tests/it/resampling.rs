@@ -137,7 +137,9 @@ fn variance_falls_with_the_number_of_iterations_and_the_mean_stays() {
         let levels: Vec<f64> = variances.iter().zip(counts).map(|(v, n)| (v * n as f64).ln()).collect();
         let mean = levels.iter().sum::<f64>() / levels.len() as f64;
         for (level, n) in levels.iter().zip(counts) {
-            assert!((level - mean).abs() < 0.35, "{}: {n} iterations, {levels:?}", spec.name);
+            // At most 0.17 with these seeds, by which variance falls a little faster than 1 / n: estimates of early iterations are
+            // poorer. A variance that stood still would be off by ln 4.
+            assert!((level - mean).abs() < 0.25, "{}: {n} iterations, {levels:?}", spec.name);
         }
         pictures[2].assert_agrees(&reference, 0.0, &format!("{} after {} iterations", spec.name, counts[2]));
     }

@@ -254,6 +254,7 @@ fn weights_do_not_depend_on_the_unit_of_length() {
                 compared += 1;
             }
         }
-        assert!(compared > unit.len() / 2, "{compared} of {}", unit.len());
+        // All 740 are, with these seeds; processors that round otherwise may lose a path.
+        assert!(compared * 100 >= 99 * unit.len(), "{compared} of {}", unit.len());
     }
 }

@@ -122,6 +122,19 @@ impl Picture {
         Picture::exact(vec![[value; 3]; pixels])
     }
 
+    /// The window `[x, y, width, height]` of a picture that has rows of `row` pixels. Its mean gets an upper bound of the variance, as
+    /// if the errors of all pixels were the same.
+    pub fn window(&self, row: u32, [x, y, width, height]: [u32; 4]) -> Picture {
+        let inside: Vec<usize> =
+            (0..height).flat_map(|j| (0..width).map(move |i| ((y + j) * row + x + i) as usize)).collect();
+        let mut part = Picture::exact(inside.iter().map(|&i| self.mean[i]).collect());
+        part.variance = inside.iter().map(|&i| self.variance[i]).collect();
+        part.freedom = self.freedom;
+        let sum: f64 = part.variance.iter().flatten().map(|v| v.sqrt()).sum();
+        part.whole.1 = (sum / (3 * inside.len()) as f64).powi(2);
+        part
+    }
+
     /// Fails unless the expectations of both pictures are the same up to `tolerance` (relative), at [`SIGNIFICANCE`].
     pub fn assert_agrees(&self, other: &Picture, tolerance: f64, what: &str) {
         if let Some(difference) = self.difference(other, tolerance) {
