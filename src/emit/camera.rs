@@ -156,11 +156,6 @@ impl Camera {
         self.lens_radius == 0.0
     }
 
-    /// Angle that one pixel covers at the film's centre, about, in radians.
-    pub fn pixel_angle(&self) -> f32 {
-        2.0 * self.half.x / self.size.x
-    }
-
     fn lens_point(&self, u: [f32; 2]) -> Vec3 {
         if self.is_pinhole() { Vec3::ZERO } else { (square_to_disk(u) * self.lens_radius).extend(0.0) }
     }

@@ -6,9 +6,9 @@
 
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::spherical_triangle::SphericalTriangle;
-use crate::math::float::gamma;
 use crate::math::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere, square_to_triangle};
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec2, Vec3};
+use crate::ray::offset::interpolation_error;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -146,7 +146,7 @@ impl TriangleLight {
     fn point(&self, b: [f32; 2]) -> (Vec3, f32) {
         let terms = [self.v[0] * (1.0 - b[0] - b[1]), self.v[1] * b[0], self.v[2] * b[1]];
         let bound = (terms[0].abs() + terms[1].abs() + terms[2].abs()).max_element();
-        (terms[0] + terms[1] + terms[2], gamma(9) * bound)
+        (terms[0] + terms[1] + terms[2], interpolation_error(bound))
     }
 
     /// The spherical triangle if it is to be sampled by solid angle from the point `from`.

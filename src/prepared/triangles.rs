@@ -5,7 +5,7 @@
 
 use super::MeshShading;
 use crate::math::Vec3;
-use crate::math::float::gamma;
+use crate::ray::offset::interpolation_error;
 use crate::ray::{Geometry, Hit};
 use crate::scene::BsdfId;
 use glam::Vec3A;
@@ -36,12 +36,12 @@ impl Triangle {
         [(self.corners[1] - self.corners[0]).into(), (self.corners[2] - self.corners[0]).into()]
     }
 
-    /// The point with barycentrics `b` and its error bound: that of `ray::offset::barycentric_error`, from the same products.
+    /// The point with barycentrics `b` and its error bound.
     #[inline]
     pub fn at(&self, b: [f32; 3]) -> (Vec3, f32) {
         let [a, b, c] = [self.corners[0] * b[0], self.corners[1] * b[1], self.corners[2] * b[2]];
         let bound = (a.abs() + b.abs() + c.abs()).max_element();
-        ((a + b + c).into(), gamma(9) * bound)
+        ((a + b + c).into(), interpolation_error(bound))
     }
 }
 
@@ -107,5 +107,16 @@ impl TriangleTable {
     #[inline]
     pub fn triangle(&self, mesh: &MeshEntry, hit: &Hit) -> &Triangle {
         &self.triangles[mesh.first_triangle.wrapping_add(hit.triangle) as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_triangle_is_one_cache_line() {
+        assert_eq!((size_of::<Triangle>(), align_of::<Triangle>()), (64, 64));
+        assert_eq!(size_of::<MeshEntry>(), 20);
     }
 }

@@ -90,7 +90,7 @@ pub fn compare(a: &dyn RayQuery, b: &dyn RayQuery, bounds: (Vec3, Vec3), count: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::{Backend, Geometry, Instance, MeshBuffers, Targets, VertexBuffer};
+    use crate::ray::{Backend, Geometry, Instance, MeshBuffers, VertexBuffer};
     use glam::{Affine3A, Mat3A, Vec3A};
     use std::sync::Arc;
 
@@ -169,24 +169,25 @@ mod tests {
     }
 
     #[test]
-    fn batches_equal_single_queries() {
+    fn packets_equal_single_queries() {
         let geometry =
             Arc::new(Geometry { meshes: vec![soup(200, 1.0, Vec3::ZERO, 16)], world: vec![0], ..Geometry::default() });
         let mut rng = HashRng::new(1, 2, 3, 4);
         let mut coordinate = |n: usize| (0..n).map(|_| rng.next_f32() - 0.5).collect::<Vec<f32>>();
         let (x, y, z) = (coordinate(83), coordinate(83), coordinate(83));
-        let targets = Targets { x: &x, y: &y, z: &z };
+        let targets: Vec<Vec3> = (0..83).map(|i| Vec3::new(x[i], y[i], z[i])).collect();
         let origins: Vec<Vec3> = (0..13).map(|i| Vec3::splat(0.03 * i as f32 - 0.2)).collect();
         for backend in backends() {
             let query = backend.build(geometry.clone(), 1).unwrap();
-            let (mut from, mut tile) = (vec![0u64; 2], vec![0u16; 83]);
-            query.occluded_tile(&origins, targets, &mut tile);
-            for (k, &origin) in origins.iter().enumerate() {
-                query.occluded_from(origin, targets, &mut from);
-                for i in 0..83 {
-                    let single = query.occluded(&Segment::between(origin, targets.get(i)).ray());
-                    assert_eq!(from[i / 64] >> (i % 64) & 1 == 1, single);
-                    assert_eq!(tile[i] >> k & 1 == 1, single);
+            for &target in &targets {
+                // A packet that is not full.
+                let mut packet = SegmentPacket::default();
+                origins.iter().for_each(|&origin| packet.push(&Segment::between(origin, target)));
+                let (mask, invalid) = query.occluded_packet(&packet);
+                assert_eq!(invalid, 0);
+                for (k, &origin) in origins.iter().enumerate() {
+                    let single = query.occluded(&Segment::between(origin, target).ray());
+                    assert_eq!(mask >> k & 1 == 1, single);
                 }
             }
         }

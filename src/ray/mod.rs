@@ -151,34 +151,6 @@ impl SegmentPacket {
     }
 }
 
-/// Far points of many segments, one array per axis, ideally sorted by position. They are already off their surfaces.
-#[derive(Clone, Copy, Debug)]
-pub struct Targets<'a> {
-    /// x.
-    pub x: &'a [f32],
-    /// y.
-    pub y: &'a [f32],
-    /// z.
-    pub z: &'a [f32],
-}
-
-impl Targets<'_> {
-    /// Number of points.
-    pub fn len(&self) -> usize {
-        self.x.len()
-    }
-
-    /// True if there are none.
-    pub fn is_empty(&self) -> bool {
-        self.x.is_empty()
-    }
-
-    /// Point `i`.
-    pub fn get(&self, i: usize) -> Vec3 {
-        Vec3::new(self.x[i], self.y[i], self.z[i])
-    }
-}
-
 /// A backend: answers questions about one immutable scene, from any number of threads at once.
 pub trait RayQuery: Send + Sync {
     /// Name and version, for people.
@@ -209,45 +181,6 @@ pub trait RayQuery: Send + Sync {
             }
         }
         (mask, invalid)
-    }
-
-    /// One origin against many targets (a visibility pmf): bit `i % 64` of `blocked[i / 64]` is set if target `i` is not seen.
-    ///
-    /// # Panics
-    /// If `blocked` is shorter than the targets need.
-    fn occluded_from(&self, origin: Vec3, targets: Targets, blocked: &mut [u64]) -> u32 {
-        blocked[..targets.len().div_ceil(64)].fill(0);
-        let (mut packet, mut invalid) = (SegmentPacket::default(), 0);
-        for first in (0..targets.len()).step_by(PACKET) {
-            packet.len = 0;
-            for i in first..targets.len().min(first + PACKET) {
-                packet.push(&Segment::between(origin, targets.get(i)));
-            }
-            let (mask, bad) = self.occluded_packet(&packet);
-            invalid += bad;
-            blocked[first / 64] |= u64::from(mask) << (first % 64);
-        }
-        invalid
-    }
-
-    /// A tile of up to sixteen neighbouring origins against many targets, the fastest form: bit `k` of `blocked[i]` is set if
-    /// origin `k` does not see target `i`.
-    ///
-    /// # Panics
-    /// If there are more than sixteen origins or `blocked` is shorter than the targets.
-    fn occluded_tile(&self, origins: &[Vec3], targets: Targets, blocked: &mut [u16]) -> u32 {
-        let (mut packet, mut invalid) = (SegmentPacket::default(), 0);
-        for (i, out) in blocked[..targets.len()].iter_mut().enumerate() {
-            packet.len = 0;
-            let target = targets.get(i);
-            for &origin in origins {
-                packet.push(&Segment::between(origin, target));
-            }
-            let (mask, bad) = self.occluded_packet(&packet);
-            invalid += bad;
-            *out = mask;
-        }
-        invalid
     }
 }
 
@@ -291,3 +224,18 @@ impl Backend {
 #[derive(Debug, thiserror::Error)]
 #[error("ray queries: {0}")]
 pub struct QueryError(pub String);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every ray query copies them.
+    #[test]
+    fn rays_and_hits_are_small() {
+        assert_eq!(size_of::<Ray>(), 32);
+        assert_eq!(size_of::<Hit>(), 24);
+        assert_eq!(size_of::<Segment>(), 28);
+        // Seven lines of sixteen floats, and the number of segments.
+        assert_eq!(size_of::<SegmentPacket>(), 8 * 64);
+    }
+}

@@ -9,17 +9,16 @@ use crate::math::{Vec3, float::gamma};
 
 const SQRT_3: f32 = 1.732_050_8;
 
-/// Error bound of a point interpolated between corners with weights that sum to one, and of moving it off the surface: γ(7) for
-/// the point and two roundings for the move.
+/// Error bound of a point Σ b_i v_i interpolated between three corners v_i with weights b_i that sum to one, and of moving it off the
+/// surface: γ(7) for the point and two roundings for the move. `sum` is the largest component of Σ |b_i v_i|.
 #[inline]
-pub fn barycentric_error(corners: &[Vec3; 3], b: [f32; 3]) -> f32 {
-    let sum = corners[0].abs() * b[0].abs() + corners[1].abs() * b[1].abs() + corners[2].abs() * b[2].abs();
-    gamma(9) * sum.max_element()
+pub fn interpolation_error(sum: f32) -> f32 {
+    gamma(9) * sum
 }
 
 /// Moves `p` off its surface to the side to which `towards` points. A box of half width `error` reaches √3 of it along a unit normal at
 /// most; that is less work than how far it reaches along `ng`. The sum is rounded as well, which the bound has room for
-/// (see [`barycentric_error`]): no step to the next float is needed.
+/// (see [`interpolation_error`]): no step to the next float is needed.
 #[inline]
 pub fn offset_point(p: Vec3, error: f32, ng: Vec3, towards: Vec3) -> Vec3 {
     p + ng * (error * SQRT_3).copysign(towards.dot(ng))
@@ -80,7 +79,8 @@ mod tests {
             prop_assume!(n.length() > 1e-2 * scale * scale);
             let b = [1.0 - u - v, u, v];
             let p = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
-            let error = barycentric_error(&corners, b);
+            let sum = corners[0].abs() * b[0] + corners[1].abs() * b[1] + corners[2].abs() * b[2];
+            let error = interpolation_error(sum.max_element());
             // The plane in double precision decides on which side the moved point is.
             let (n64, c0) = (((corners[1] - corners[0]).as_dvec3()).cross((corners[2] - corners[0]).as_dvec3()), corners[0].as_dvec3());
             for side in [1.0f32, -1.0] {

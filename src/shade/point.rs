@@ -38,3 +38,14 @@ impl Default for SurfacePoint {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One is written for every vertex of every path.
+    #[test]
+    fn a_surface_point_has_no_padding() {
+        assert_eq!(size_of::<SurfacePoint>(), 27 * size_of::<f32>());
+    }
+}
