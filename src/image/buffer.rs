@@ -35,6 +35,16 @@ impl fmt::Debug for Pixels {
 }
 
 /// A picture.
+///
+/// ```
+/// use lightsieve::image::{Image, Pixels};
+///
+/// // Two pixels of one grey channel, as an eight-bit file has them.
+/// let image = Image { width: 2, height: 1, channels: 1, pixels: Pixels::Srgb8(vec![0, 188]) };
+/// assert_eq!(image.value(0, 0, 0), 0.0);
+/// // sRGB 188 is about half of the radiance of white.
+/// assert!((image.rgb(1, 0).g - 0.5).abs() < 0.01);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// Pixels in a row.

@@ -3,6 +3,17 @@
 //!
 //! The only conversions are [`SolidAnglePdf::to_area`] and [`AreaPdf::to_solid_angle`], and [`area_jacobian`] where one
 //! factor serves several densities (Veach 1997, eq. 8.8: p_A(x') = p_σ(ω) |cos θ'| / d²).
+//!
+//! ```
+//! use lightsieve::math::{Pmf, SolidAnglePdf};
+//!
+//! // A direction, drawn with a density of 0.5 per steradian by a strategy that is taken half of the time, meets a surface at a distance
+//! // of 2 at 60 degrees to its normal.
+//! let direction = SolidAnglePdf(0.5) * Pmf(0.5);
+//! let position = direction.to_area(0.5, 4.0);
+//! assert_eq!(position.0, 0.5 * 0.5 * 0.5 / 4.0);
+//! assert_eq!(position.to_solid_angle(0.5, 4.0), direction);
+//! ```
 
 /// Density per steradian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
