@@ -305,7 +305,7 @@ impl Scene {
         if lamps > 0 {
             lights.push(format!("{lamps} lamp{}", if lamps == 1 { "" } else { "s" }));
         }
-        lights.extend(self.infinite.iter().map(|s| s.to_string()));
+        lights.extend(self.infinite.iter().map(ToString::to_string));
         Ok(Row { name: self.name, purpose: self.purpose, triangles, lights: lights.join(" + "), bytes })
     }
 }

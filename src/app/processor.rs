@@ -37,7 +37,11 @@ pub(crate) fn missing_instruction_sets() -> Vec<&'static str> {
         instruction_set!("avx512dq", structured.has_avx512dq()),
         instruction_set!("avx512vl", structured.has_avx512vl()),
         // The operating system must save the wide registers of AVX.
-        ("xsave (operating system)", cfg!(target_feature = "avx"), basic.as_ref().is_some_and(|f| f.has_oxsave())),
+        (
+            "xsave (operating system)",
+            cfg!(target_feature = "avx"),
+            basic.as_ref().is_some_and(raw_cpuid::FeatureInfo::has_oxsave),
+        ),
     ])
 }
 

@@ -34,7 +34,7 @@ pub fn atomic_write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
     }
     let mut out = BufWriter::new(file);
     write(&mut out)?;
-    out.into_inner().map_err(|e| e.into_error())?.sync_all()?;
+    out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
     fs::rename(&temporary.path, &target)?;
     temporary.keep();
     // The contents are safe already; that a folder cannot be flushed (network file systems) is no failure.

@@ -28,7 +28,7 @@ impl<'a> Words<'a> {
             skip += 1;
         }
         let word = &rest[skip..];
-        let length = word.iter().position(|b| b.is_ascii_whitespace()).unwrap_or(word.len());
+        let length = word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len());
         self.at += skip + length;
         std::str::from_utf8(&word[..length])
             .ok()

@@ -96,8 +96,8 @@ fn encode_picture(picture: &Picture, format: OutputFormat, exposure: f32) -> Res
     check(picture)?;
     match format {
         OutputFormat::Exr => exr_out::encode(picture),
-        OutputFormat::Pfm => Ok(encode_pfm(picture, main_channels(picture)?)),
-        OutputFormat::Png => encode_png(picture, main_channels(picture)?, exposure),
+        OutputFormat::Pfm => Ok(encode_pfm(picture, &main_channels(picture)?)),
+        OutputFormat::Png => encode_png(picture, &main_channels(picture)?, exposure),
     }
 }
 
@@ -129,14 +129,14 @@ fn main_channels(picture: &Picture) -> Result<Vec<&[f32]>, String> {
     }
 }
 
-fn encode_pfm(picture: &Picture, channels: Vec<&[f32]>) -> Vec<u8> {
+fn encode_pfm(picture: &Picture, channels: &[&[f32]]) -> Vec<u8> {
     let kind = if channels.len() == 3 { "PF" } else { "Pf" };
     // A negative scale announces little-endian.
     let mut out = format!("{kind}\n{} {}\n-1.0\n", picture.width, picture.height).into_bytes();
     let width = picture.width as usize;
     for y in (0..picture.height as usize).rev() {
         for i in y * width..(y + 1) * width {
-            for channel in &channels {
+            for channel in channels {
                 out.extend_from_slice(&channel[i].to_le_bytes());
             }
         }
@@ -144,13 +144,13 @@ fn encode_pfm(picture: &Picture, channels: Vec<&[f32]>) -> Vec<u8> {
     out
 }
 
-fn encode_png(picture: &Picture, channels: Vec<&[f32]>, exposure: f32) -> Result<Vec<u8>, String> {
+fn encode_png(picture: &Picture, channels: &[&[f32]], exposure: f32) -> Result<Vec<u8>, String> {
     use image::ImageEncoder;
     let gain = f64::from(exposure).exp2();
     let pixels = picture.width as usize * picture.height as usize;
     let mut bytes = Vec::with_capacity(pixels * channels.len());
     for i in 0..pixels {
-        for channel in &channels {
+        for channel in channels {
             bytes.push(to_srgb8(f64::from(channel[i]) * gain));
         }
     }

@@ -121,9 +121,9 @@ impl Assets {
                     let io = matches!(e, MeshError::Io(_));
                     let d = missing_mesh(&path, &e).at(span);
                     if io {
-                        report.push_io(d)
+                        report.push_io(d);
                     } else {
-                        report.push(d)
+                        report.push(d);
                     }
                     MeshDesc::default()
                 }

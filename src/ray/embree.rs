@@ -18,7 +18,8 @@ use std::sync::{Arc, Mutex};
     non_upper_case_globals,
     dead_code,
     clippy::all,
-    clippy::pedantic
+    clippy::pedantic,
+    clippy::undocumented_unsafe_blocks
 )]
 mod sys {
     include!(concat!(env!("OUT_DIR"), "/embree.rs"));

@@ -136,7 +136,7 @@ impl Builder<'_> {
             .map_err(|m| {
                 self.push(
                     Diagnostic::error("scene::bad-value", format!("`{}`: {m}", path.display())).at(attr.span.clone()),
-                )
+                );
             })
             .ok()
     }

@@ -191,7 +191,7 @@ pub fn mentioned_paths(tokens: &[Token], module: &[String]) -> Vec<(Vec<String>,
         };
         match tokens[i].text.as_str() {
             "mod" if tokens.get(i + 2).is_some_and(|t| t.text == "{") => {
-                inline.push((depth, tokens[i + 1].text.clone()))
+                inline.push((depth, tokens[i + 1].text.clone()));
             }
             "{" => depth += 1,
             "}" => {
