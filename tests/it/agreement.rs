@@ -86,7 +86,11 @@ fn every_integrator_agrees_with_the_path_tracer() {
         }
     }
     for (integrator, (failed, compared)) in &repeated {
-        assert!(failed.len() <= MAX_REPEATED, "{integrator}: {} of {compared} failed at first: {failed:?}", failed.len());
+        assert!(
+            failed.len() <= MAX_REPEATED,
+            "{integrator}: {} of {compared} failed at first: {failed:?}",
+            failed.len()
+        );
     }
 }
 
