@@ -1,8 +1,8 @@
 //! Pixel sums and the guard at their door.
 //!
-//! The film is cut into tiles that one worker owns at a time, so nothing is locked, nothing is summed in an order that depends on
-//! the number of threads, and the sums are double precision. Nothing that is not finite is ever added: it is counted, and
-//! where it came from is kept.
+//! The film is cut into tiles that one worker owns at a time, so nothing is locked, nothing is summed in an order
+//! that depends on the number of threads, and the sums are double precision. Nothing that is not finite is ever
+//! added: it is counted, and where it came from is kept.
 
 pub mod pyramid;
 pub mod splat;
@@ -10,7 +10,7 @@ pub mod tile;
 
 pub use pyramid::Pyramid;
 pub use splat::{LightImage, Splat};
-pub use tile::{FilmTile, Part, SampleBuffer};
+pub use tile::{FilmTile, NonFiniteSource, Part, SampleBuffer};
 
 use crate::math::Rgb;
 
@@ -28,10 +28,12 @@ pub struct NonFinite {
     pub y: u32,
     /// Iteration.
     pub iteration: u64,
+    /// The first contribution to it that was not finite.
+    pub source: NonFiniteSource,
 }
 
 /// The part of the picture that is rendered, with its sums.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Film {
     /// Left edge, in pixels of the full picture.
     pub x0: u32,
@@ -63,8 +65,8 @@ impl Film {
         Film { x0, y0, width, height, tiles, iterations: 0 }
     }
 
-    /// Begins the next iteration and returns its index, from zero on. From now on it counts as one of [`Film::iterations`]; all its
-    /// samples are added before the next begins.
+    /// Begins the next iteration and returns its index, from zero on. From now on it counts as one of
+    /// [`Film::iterations`]; all its samples are added before the next begins.
     pub fn begin_iteration(&mut self) -> u64 {
         self.iterations += 1;
         self.iterations - 1
@@ -137,6 +139,14 @@ impl Film {
         }
     }
 
+    /// True if its tiles are those of an empty film for the window: a film that was read from a file is whole then.
+    pub fn is_of_window(&self, window: [u32; 4]) -> bool {
+        let expected = Film::new(window);
+        let layout = |t: &FilmTile| ([t.x0, t.y0, t.width, t.height], t.sums.len(), t.squares.len());
+        [self.x0, self.y0, self.width, self.height] == window
+            && self.tiles.iter().map(layout).eq(expected.tiles.iter().map(layout))
+    }
+
     /// How many samples were not finite, and where the first of them were.
     pub fn non_finite(&self) -> (u64, Vec<NonFinite>) {
         let count = self.tiles.iter().map(|t| t.non_finite).sum();
@@ -188,7 +198,7 @@ mod tests {
             }
             tile.commit(&buffer, None, iteration);
         }
-        assert_eq!(film.non_finite(), (1, vec![NonFinite { x: 2, y: 1, iteration: 1 }]));
+        assert_eq!(film.non_finite(), (1, vec![NonFinite { x: 2, y: 1, iteration: 1, source: NonFiniteSource::Hit }]));
         assert_eq!(film.mean()[0], Rgb::WHITE);
         assert_eq!(film.mean()[6], Rgb::grey(0.5));
     }

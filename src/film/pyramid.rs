@@ -1,5 +1,5 @@
-//! The pyramid of techniques (Veach 1997, Figs. 10.2 and 10.3): for every path length k and every technique (s, k + 1 − s) the picture
-//! that the technique makes by itself (raw), and what its weights leave of it.
+//! The pyramid of techniques (Veach 1997, Figs. 10.2 and 10.3): for every path length k and every technique (s, k + 1
+//! − s) the picture that the technique makes by itself (raw), and what its weights leave of it.
 
 use crate::math::Rgb;
 
@@ -38,8 +38,8 @@ impl Pyramid {
         k * (k + 1) / 2 - 1 + s
     }
 
-    /// Adds what the technique (s, t) found for a pixel of the full picture. Longer paths and other pixels are left out, and values that
-    /// are not finite, which the film reports.
+    /// Adds what the technique (s, t) found for a pixel of the full picture. Longer paths and other pixels are left
+    /// out, and values that are not finite, which the film reports.
     pub fn add(&mut self, (s, t): (usize, usize), (x, y): (u32, u32), raw: Rgb, weight: f32) {
         let [x0, y0, width, height] = self.window;
         let (k, x, y) = (s + t - 1, x.wrapping_sub(x0), y.wrapping_sub(y0));
@@ -51,6 +51,18 @@ impl Pyramid {
             for (sum, v) in sums[pixel].iter_mut().zip(value.to_array()) {
                 *sum += f64::from(v);
             }
+        }
+    }
+
+    /// Adds the iterations of another pyramid of the same window and path lengths.
+    ///
+    /// # Panics
+    /// If it is of another window or other path lengths.
+    pub fn merge(&mut self, other: &Pyramid) {
+        assert_eq!((self.window, self.max_edges), (other.window, other.max_edges));
+        self.iterations += other.iterations;
+        for (sums, more) in self.sums.iter_mut().flatten().zip(other.sums.iter().flatten()) {
+            sums.as_flattened_mut().iter_mut().zip(more.as_flattened()).for_each(|(a, b)| *a += b);
         }
     }
 
@@ -71,8 +83,8 @@ impl Pyramid {
         sums.iter().map(|p| Rgb::from(p.map(|v| (v * scale) as f32))).collect()
     }
 
-    /// All pictures on one sheet: a row for each path length, raw to the left and weighted to the right, s growing from left to
-    /// right. Returns width, height and pixels.
+    /// All pictures on one sheet: a row for each path length, raw to the left and weighted to the right, s growing
+    /// from left to right. Returns width, height and pixels.
     pub fn sheet(&self) -> (u32, u32, Vec<Rgb>) {
         const GAP: usize = 4;
         let step = (self.window[2] as usize).div_ceil(CELL).max(1);
@@ -137,5 +149,16 @@ mod tests {
         }
         let (width, height, sheet) = pyramid.sheet();
         assert_eq!(sheet.len(), (width * height) as usize);
+
+        // The mean of a pyramid and an empty one of three iterations is a quarter of it.
+        let mut mean = pyramid.clone();
+        let mut empty = Pyramid::new([2, 1, 5, 3], 4);
+        empty.iterations = 3;
+        mean.merge(&empty);
+        assert_eq!(mean.iterations, 4);
+        for technique in pyramid.techniques() {
+            let [one, quarter] = [&pyramid, &mean].map(|p| p.picture(technique, Side::Weighted)[6].r);
+            assert_eq!(quarter, 0.25 * one);
+        }
     }
 }

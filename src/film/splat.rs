@@ -1,7 +1,8 @@
 //! The light image: what light sub-paths bring to pixels anywhere in the picture.
 //!
-//! Workers collect splats in lists of their own. After the iteration they are sorted by pixel and, within a pixel, by the light
-//! sub-path and vertex they come from, and only then added up: the same bits for any number of threads, in any crop window.
+//! Workers collect splats in lists of their own. After the iteration they are sorted by pixel and, within a pixel, by
+//! the light sub-path and vertex they come from, and only then added up: the same bits for any number of threads, in
+//! any crop window.
 
 use crate::math::Rgb;
 use rayon::prelude::*;

@@ -4,7 +4,7 @@ use super::{KEPT_PLACES, LightImage, NonFinite};
 use crate::math::Rgb;
 
 /// Sums of a rectangle of pixels.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct FilmTile {
     /// Left edge, in pixels of the full picture.
     pub x0: u32,
@@ -65,7 +65,8 @@ impl FilmTile {
             if !value.is_finite() {
                 self.non_finite += 1;
                 if self.places.len() < KEPT_PLACES {
-                    self.places.push(NonFinite { x, y, iteration });
+                    let source = samples.non_finite_source(i, splats);
+                    self.places.push(NonFinite { x, y, iteration, source });
                 }
                 continue;
             }
@@ -90,10 +91,40 @@ pub enum Part {
     Connection,
 }
 
+/// Kind of technique that brought a non-finite contribution to a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NonFiniteSource {
+    /// A walk that met light.
+    Hit,
+    /// Next event.
+    NextEvent,
+    /// A connection of two sub-paths.
+    Connection,
+    /// A light sub-path that was connected to the camera.
+    LightImage,
+    /// All contributions were finite, but not their sum.
+    Sum,
+}
+
+impl NonFiniteSource {
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            NonFiniteSource::Hit => "hit",
+            NonFiniteSource::NextEvent => "next event",
+            NonFiniteSource::Connection => "connection",
+            NonFiniteSource::LightImage => "light image",
+            NonFiniteSource::Sum => "sum of finite contributions",
+        }
+    }
+}
+
 /// One sample of every pixel of a tile, collected while its shadow rays are under way.
 ///
-/// When a shadow ray is answered depends on its neighbours in the packet, and with them on the tile and on a crop window. What
-/// waits in different queues is therefore summed apart, each part in an order of the pixel's own: the same bits in any window.
+/// When a shadow ray is answered depends on its neighbours in the packet, and with them on the tile and on a crop
+/// window. What waits in different queues is therefore summed apart, each part in an order of the pixel's own: the
+/// same bits in any window.
 #[derive(Clone, Debug, Default)]
 pub struct SampleBuffer {
     parts: [Vec<Rgb>; 3],
@@ -112,5 +143,50 @@ impl SampleBuffer {
     #[inline]
     pub fn add(&mut self, part: Part, i: u32, value: Rgb) {
         self.parts[part as usize][i as usize] += value;
+    }
+
+    /// Where the sample of pixel `i` stops being finite; `splats` is what the light image adds to it.
+    fn non_finite_source(&self, i: u32, splats: Rgb) -> NonFiniteSource {
+        let part = |part: Part| self.parts[part as usize][i as usize];
+        let contributions = [
+            (part(Part::AtOnce), NonFiniteSource::Hit),
+            (part(Part::Direct), NonFiniteSource::NextEvent),
+            (part(Part::Connection), NonFiniteSource::Connection),
+            (splats, NonFiniteSource::LightImage),
+        ];
+        contributions.into_iter().find(|(v, _)| !v.is_finite()).map_or(NonFiniteSource::Sum, |(_, source)| source)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{Film, Splat};
+
+    #[test]
+    fn the_source_of_a_non_finite_sample_is_told() {
+        let nan = Rgb::new(f32::NAN, 0.0, 0.0);
+        let max = Rgb::grey(f32::MAX);
+        let source = |contributions: &[(Part, Rgb)], splat: Rgb| {
+            let window = [0, 0, 3, 2];
+            let (mut film, mut buffer) = (Film::new(window), SampleBuffer::default());
+            let iteration = film.begin_iteration();
+            buffer.clear(film.tiles[0].pixels());
+            contributions.iter().for_each(|&(part, value)| buffer.add(part, 4, value));
+            let splat = Splat { x: 1, y: 1, value: splat, ..Splat::default() };
+            film.tiles[0].commit(&buffer, Some(&LightImage::new(window, vec![vec![splat]])), iteration);
+            let (count, places) = film.non_finite();
+            places.first().map(|p| (count, p.x, p.y, p.source))
+        };
+        let at = |source| Some((1, 1, 1, source));
+        assert_eq!(source(&[(Part::AtOnce, Rgb::WHITE)], Rgb::WHITE), None);
+        assert_eq!(source(&[(Part::AtOnce, nan)], Rgb::WHITE), at(NonFiniteSource::Hit));
+        assert_eq!(
+            source(&[(Part::Direct, nan), (Part::AtOnce, Rgb::WHITE)], Rgb::WHITE),
+            at(NonFiniteSource::NextEvent)
+        );
+        assert_eq!(source(&[(Part::Connection, nan)], Rgb::WHITE), at(NonFiniteSource::Connection));
+        assert_eq!(source(&[], nan), at(NonFiniteSource::LightImage));
+        assert_eq!(source(&[(Part::AtOnce, max), (Part::Direct, max)], Rgb::BLACK), at(NonFiniteSource::Sum));
     }
 }
