@@ -6,10 +6,11 @@
 //! math → image → scene → load → ray → shade → spatial → emit → prepared → skeleton → path → mis → film → bidir → integrators → render → measure → app
 //! ```
 //!
-//! Data flows one way and can be read in `render::driver`:
+//! Data flows one way and can be read in [`render::job::render`], which is the table of contents of the program:
 //!
 //! ```text
-//! file → SceneDesc → PreparedScene → integrator.iterate(k) → Film → EXR / PNG / JSON
+//! file → SceneDesc → Plan    → PreparedScene → integrator.iterate(k) → Film → EXR / PNG / JSON
+//!      load        resolve   prepare           run                          finish
 //! ```
 //!
 //! A render of four samples per pixel:

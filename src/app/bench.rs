@@ -1,19 +1,19 @@
-//! `lightsieve bench`: all scenes with all integrators, against an earlier day.
+//! `lightsieve bench`: all scenes with all integrators, against earlier measurements.
 
 use super::Failure;
 use super::measure_args::BenchArgs;
-use super::stage::{Set, Stage, to_json};
+use super::session::{SceneMethods, Session, to_json};
 use crate::image::atomic_write;
 use crate::measure::bench::{Baseline, Row, Table as Measured, Verdict, against, calibrate};
-use crate::measure::converge::converge;
+use crate::measure::converge::{EqualTimeTask, converge};
 use crate::measure::curve::runs_of;
 use crate::measure::report::Table;
 use crate::measure::{LoadWatch, Machine};
+use crate::render::Method;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Answer<'a> {
     #[serde(flatten)]
@@ -24,26 +24,27 @@ struct Answer<'a> {
 
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     let baseline = args.against.as_deref().map(read).transpose()?;
-    let stage = Stage::new(&args.measure)?;
+    let session = Session::new(&args.measure)?;
     let scenes = find_scenes(&args.folder)?;
     let (watch, mut rows, mut backend) = (LoadWatch::start(), vec![], String::new());
     for path in &scenes {
-        let set = stage.set(path, Some(&args.references))?;
-        stage.say(&format!("{}: {} methods", set.name, set.contenders.len()));
-        rows.extend(one_scene(args, &stage, &set)?);
-        backend = set.scene.query.describe();
-        if stage.interrupt.load(Ordering::Relaxed) {
+        let scene = session.prepare(path, Some(&args.references))?;
+        session.say(&format!("{}: {} methods", scene.name, scene.methods.len()));
+        rows.extend(one_scene(args, &session, &scene)?);
+        backend = scene.scene.query.describe();
+        if session.environment.is_interrupted() {
             return Err(Failure::Interrupted);
         }
     }
-    let measured = Measured { machine: Machine::here(stage.threads, backend), load: watch.finish(), rows };
+    let measured =
+        Measured { machine: Machine::here(session.environment.threads, backend), load: watch.finish(), rows };
     let verdicts = baseline.as_ref().map(|old| against(&old.rows, &measured.rows));
     if args.measure.json {
         out!("{}", to_json(&Answer { measured: &measured, against: verdicts.as_deref() })?);
     } else {
         print(&measured.rows, verdicts.as_deref());
     }
-    stage.say(&measured.load.sentence());
+    session.say(&measured.load.sentence());
     if let Some(path) = &args.save {
         let text = to_json(&measured)?;
         atomic_write(path, |w| writeln!(w, "{text}")).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
@@ -89,18 +90,24 @@ fn find_scenes(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(scenes)
 }
 
-fn one_scene(args: &BenchArgs, stage: &Stage, set: &Set) -> Result<Vec<Row>, Failure> {
-    let reference = stage.reference(set, &args.references)?;
+fn one_scene(args: &BenchArgs, session: &Session, scene: &SceneMethods) -> Result<Vec<Row>, Failure> {
+    let reference = session.reference(scene, &args.references)?;
     let seeds: Vec<u64> = (1..=args.seeds).collect();
-    let (before, runs, after) = stage.pool.install(|| {
+    let task = EqualTimeTask {
+        scene: &scene.scene,
+        methods: &scene.methods,
+        reference: &reference.pixels,
+        time: args.time,
+        seeds: &seeds,
+    };
+    let (before, runs, after) = session.environment.pool.install(|| {
         let before = calibrate();
-        let time = (args.time, seeds.as_slice());
-        let runs = converge(&set.scene, &set.contenders, &reference.pixels, time, &stage.interrupt, |_| {});
+        let runs = converge(&task, session.environment.interrupt(), |_| {});
         (before, runs, calibrate())
     });
-    let mood = 0.5 * (before + after);
-    let row = |c: &crate::measure::Contender| Row::new(&set.name, &c.label, &runs_of(&runs, &c.label), mood);
-    Ok(set.contenders.iter().map(row).collect())
+    let calibration = 0.5 * (before + after);
+    let row = |m: &Method| Row::new(&scene.name, &m.label, &runs_of(&runs, &m.label), calibration);
+    Ok(scene.methods.iter().map(row).collect())
 }
 
 fn print(rows: &[Row], verdicts: Option<&[Verdict]>) {

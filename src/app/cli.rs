@@ -1,4 +1,4 @@
-//! What may be typed. These structs hold what was typed; `config` holds what it means.
+//! Arguments of the commands. `config` turns them into requests.
 
 use super::measure_args::{BenchArgs, ConvergeArgs, MergeArgs, ProfileArgs};
 use crate::ray::Backend;
@@ -12,7 +12,10 @@ use std::time::Duration;
 #[command(
     version,
     max_term_width = 110,
-    after_help = "Exit codes: 0 fine, 1 non-finite samples under --strict or a regression found by bench, 2 bad usage or input, 3 files cannot be read or written, 130 interrupted.\nThe same seed gives the same bits for any number of threads; --time may stop at another iteration each time."
+    after_help = "Exit codes: 0 fine, 1 non-finite samples under --strict or a regression found by bench, \
+                  2 bad usage or input, 3 files cannot be read or written, 130 interrupted.\n\
+                  The same seed gives the same bits for any number of threads; --time may stop at another iteration \
+                  each time."
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -43,7 +46,7 @@ pub(crate) enum Command {
     Bench(Box<BenchArgs>),
 }
 
-/// Where the scene comes from.
+/// Scene file and how it is read.
 #[derive(Debug, Args)]
 pub(crate) struct SceneArgs {
     /// Scene file: Mitsuba XML (.xml), OBJ with MTL (.obj) or PLY (.ply)
@@ -68,9 +71,9 @@ pub(crate) struct SceneArgs {
     pub camera_fov: Option<f64>,
 }
 
-/// Which samples: those that are rendered, or one of them to be replayed.
+/// The samples that are rendered, or one of them to be replayed.
 #[derive(Debug, Args)]
-pub(crate) struct WhatArgs {
+pub(crate) struct SampleArgs {
     /// Integrator (see `lightsieve list`)
     #[arg(short, long, value_name = "NAME")]
     pub integrator: Option<String>,
@@ -102,16 +105,16 @@ pub(crate) struct RenderArgs {
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
     #[command(flatten)]
-    pub what: WhatArgs,
+    pub sample: SampleArgs,
     /// Samples per pixel (iterations)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub spp: Option<u64>,
     /// Time budget of the iterations, e.g. 30s, 5m, 1.5h
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub time: Option<Duration>,
-    /// Stop when the estimated error is below, e.g. relmse=0.01 (also mape, mae, mse, rmse, relmse_trimmed); renders two halves with seeds of
-    /// their own, whose difference tells
-    #[arg(long, value_name = "MEASURE=VALUE", value_parser = ErrorTarget::parse, conflicts_with_all = ["checkpoint", "resume", "pyramid"])]
+    /// Stop when the estimated error is below, e.g. relmse=0.01 (also mape, mae, mse, rmse, relmse_trimmed); renders
+    /// two halves with seeds of their own, whose difference tells
+    #[arg(long, value_name = "MEASURE=VALUE", value_parser = ErrorTarget::parse)]
     pub error_target: Option<ErrorTarget>,
     /// Threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
@@ -156,7 +159,7 @@ pub(crate) struct ReplayArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub iteration: u64,
     #[command(flatten)]
-    pub what: WhatArgs,
+    pub sample: SampleArgs,
 }
 
 #[derive(Debug, Args)]
@@ -169,7 +172,8 @@ pub(crate) struct InfoArgs {
     /// Draw the skeleton over the camera's view: .png, .exr or .pfm
     #[arg(long, value_name = "FILE")]
     pub skeleton_image: Option<PathBuf>,
-    /// Cubes along the longest side of the scene from which the skeleton is made [default: 120, and up to 240 for flat scenes]
+    /// Cubes along the longest side of the scene from which the skeleton is made [default: 120, and up to 240 for
+    /// flat scenes]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=512))]
     pub skeleton_cells: Option<u32>,
 }

@@ -12,7 +12,7 @@ use crate::image::{
 use serde::Serialize;
 use std::path::Path;
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Answer {
     #[serde(flatten)]
@@ -28,7 +28,7 @@ fn read(path: &Path) -> Result<(Image, Option<Colours>), Failure> {
         _ => Failure::input(&e),
     };
     let image = read_image(path, Encoding::Auto).map_err(fault)?;
-    // A file that the simpler reader takes, but not the one for all layers, has no variance of ours.
+    // A file that only the simpler reader takes has no variance layer.
     let exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     let layers = exr.then(|| ExrFile::read(path).ok()).flatten();
     Ok((image, layers.and_then(|f| f.colours("variance"))))

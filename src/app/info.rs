@@ -2,10 +2,13 @@
 
 use super::Failure;
 use super::cli::InfoArgs;
-use super::{report, skeleton};
+use super::config::plain_options;
+use super::environment::Environment;
+use super::skeleton;
 use crate::image::{OutputFormat, Pixels};
-use crate::prepared::{PrepareOptions, PreparedScene};
-use crate::ray::Backend;
+use crate::prepared::PreparedScene;
+use crate::render::job;
+use crate::scene::SceneDesc;
 use crate::skeleton::Skeleton;
 use std::time::Instant;
 
@@ -21,9 +24,20 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     if let Some(path) = &args.skeleton_image {
         OutputFormat::of(path).map_err(Failure::input)?;
     }
-    let (desc, mut diagnostics) = report::load(&args.scene, false)?;
-    let said = diagnostics.list.len();
+    let environment = Environment::new(None, false)?;
+    let loaded = job::load(&args.scene.request(), environment.runtime())?;
     out!("scene       {}", args.scene.scene.display());
+    describe_file(&loaded.desc);
+    let scene = job::prepare(loaded, &plain_options(&environment), environment.runtime())?.scene;
+    describe_prepared(&scene);
+    if args.skeleton.is_some() || args.skeleton_image.is_some() {
+        write_skeleton(args, &scene)?;
+    }
+    Ok(())
+}
+
+/// Prints the contents of the scene file.
+fn describe_file(desc: &SceneDesc) {
     if let Some(sensor) = desc.sensors.first() {
         let film = &sensor.film;
         let lens = if sensor.aperture_radius > 0.0 { "thin lens" } else { "pinhole" };
@@ -45,16 +59,10 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         let i = &image.image;
         out!("  {}  {} x {} x {}, {space}, {}", image.path.display(), i.width, i.height, i.channels, mib(i.bytes()));
     }
-    let options = PrepareOptions {
-        backend: Backend::default_available(),
-        threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        size: None,
-        crop: None,
-    };
-    let prepared = PreparedScene::build(desc, &options, &mut diagnostics);
-    diagnostics.list.drain(..said);
-    report::print(&diagnostics);
-    let scene = prepared.map_err(Failure::input)?;
+}
+
+/// Prints the scene as rays meet it.
+fn describe_prepared(scene: &PreparedScene) {
     let shading: usize = scene.meshes.iter().map(crate::prepared::MeshShading::bytes).sum();
     out!("meshes      {}", scene.geometry.meshes.len());
     out!("instances   {}", scene.geometry.instances.len());
@@ -68,10 +76,6 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     out!("radius      {:.4}, centre {:.4} {:.4} {:.4}", scene.radius, scene.centre.x, scene.centre.y, scene.centre.z);
     out!("features    {}", scene.features.names().join(", "));
     out!("backend     {}, tree built in {:.3} s", scene.query.describe(), scene.tree_seconds);
-    if args.skeleton.is_some() || args.skeleton_image.is_some() {
-        write_skeleton(args, &scene)?;
-    }
-    Ok(())
 }
 
 fn write_skeleton(args: &InfoArgs, scene: &PreparedScene) -> Result<(), Failure> {

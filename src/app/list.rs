@@ -2,9 +2,9 @@
 
 use super::Failure;
 use super::cli::ListArgs;
-use super::config::unknown_integrator;
 use crate::integrators::params::AliasValues;
-use crate::integrators::{self, IntegratorSpec, ParamDefault, ParamSpec, REGISTRY};
+use crate::integrators::{IntegratorSpec, ParamDefault, ParamSpec, REGISTRY};
+use crate::render::method::find_integrator;
 
 /// Columns of full descriptions.
 const WIDTH: usize = 90;
@@ -21,7 +21,7 @@ pub(crate) fn run(args: &ListArgs) -> Result<(), Failure> {
         }
         return Ok(());
     };
-    let spec = integrators::find(name).ok_or_else(|| unknown_integrator(name))?;
+    let spec = find_integrator(name)?;
     out!("{}: {}\n", spec.name, spec.short);
     if args.long {
         print_descriptions(spec)

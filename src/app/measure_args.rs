@@ -1,4 +1,4 @@
-//! What may be typed to measure.
+//! Arguments of the measuring commands.
 
 use super::cli::{Query, duration, pair, size};
 use crate::measure::curve::{MEASURES, Measure};
@@ -6,7 +6,7 @@ use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What every measuring command takes.
+/// Arguments of every measuring command.
 #[derive(Debug, Args)]
 pub(crate) struct MeasureArgs {
     /// Integrators, each with parameters if wanted: path,bdpt,bdpt:heuristic=power,max_depth=6 [default: all]
@@ -35,7 +35,7 @@ pub(crate) struct MeasureArgs {
     pub quiet: bool,
 }
 
-/// Where references come from.
+/// Source of references.
 #[derive(Debug, Args)]
 pub(crate) struct ReferenceArgs {
     /// Folder of rendered references [default: lightsieve in the user's cache]

@@ -22,19 +22,20 @@ mod cli;
 mod compare;
 mod config;
 mod converge;
+mod environment;
 mod info;
 mod list;
 mod measure_args;
 mod merge;
 mod processor;
 mod profile;
-mod pyramid;
 mod render;
 mod replay;
 mod report;
+mod session;
 mod skeleton;
-mod stage;
 
+use crate::render::JobError;
 use clap::Parser;
 use std::process::ExitCode;
 
@@ -72,7 +73,21 @@ impl Failure {
     }
 }
 
-/// Runs the program and says how it ended.
+impl From<JobError> for Failure {
+    fn from(e: JobError) -> Failure {
+        match e {
+            JobError::Load(failure) => {
+                report::print(&failure.diagnostics);
+                if failure.io { Failure::Io(String::new()) } else { Failure::Input(String::new()) }
+            }
+            JobError::Input(text) => Failure::Input(text),
+            JobError::File(text) => Failure::Io(text),
+            JobError::Interrupted => Failure::Interrupted,
+        }
+    }
+}
+
+/// Runs the program; the exit code tells how it ended.
 pub fn main() -> ExitCode {
     let missing = processor::missing_instruction_sets();
     if !missing.is_empty() {

@@ -1,20 +1,21 @@
-//! `lightsieve profile`: where the time goes.
+//! `lightsieve profile`: the time of one method by phases and rays.
 
 use super::Failure;
+use super::environment::Environment;
 use super::measure_args::ProfileArgs;
-use super::stage::{Stage, command_line, to_json, write_text};
+use super::session::{Session, command_line, to_json, write_text};
 use crate::image::{Layer, Picture, write_picture};
 use crate::math::Rgb;
-use crate::measure::profile::{Profile, Task, profile};
+use crate::measure::profile::{Profile, Profiled, Task, profile};
 use crate::measure::report::pictures::doubles;
 use crate::measure::report::{Page, Shown, Table, picture_group};
 use crate::measure::visibility::CostMap;
 use std::path::Path;
 
 pub(crate) fn run(args: &ProfileArgs) -> Result<(), Failure> {
-    let stage = Stage::new(&args.measure)?;
-    let mut set = stage.set(&args.scene, None)?;
-    let method = match set.contenders.as_slice() {
+    let session = Session::new(&args.measure)?;
+    let mut scene = session.prepare(&args.scene, None)?;
+    let method = match scene.methods.as_slice() {
         [one] => one.clone(),
         [first, ..] if args.measure.integrators.is_none() => first.clone(),
         _ => return Err(Failure::Input("one method is profiled at a time: -i NAME".into())),
@@ -24,9 +25,11 @@ pub(crate) fn run(args: &ProfileArgs) -> Result<(), Failure> {
         method: &method,
         seed: args.seed,
         time: args.time,
-        threads: stage.threads,
+        threads: session.environment.threads,
     };
-    let (found, film, map) = stage.pool.install(|| profile(&mut set.scene, &task)).map_err(Failure::input)?;
+    let Environment { pool, .. } = &session.environment;
+    let profiled = pool.install(|| profile(&mut scene.scene, &task, session.environment.interrupt()))?;
+    let Profiled { profile: found, picture, map } = profiled;
     let tables = tables(&found);
     if args.measure.json {
         out!("{}", to_json(&found)?);
@@ -38,14 +41,14 @@ pub(crate) fn run(args: &ProfileArgs) -> Result<(), Failure> {
             out!("");
         }
     }
-    stage.say(&found.load.sentence());
+    session.say(&found.load.sentence());
     if let Some(folder) = &args.report {
-        stage.say(&format!("wrote {}", write_text(folder, "profile.json", &to_json(&found)?)?.display()));
+        session.say(&format!("wrote {}", write_text(folder, "profile.json", &to_json(&found)?)?.display()));
         for (name, pixels) in [("cost.exr", map.cost_picture()), ("blocked.exr", map.blocked_picture())] {
-            stage.say(&format!("wrote {}", write_map(folder, name, &map, &pixels)?.display()));
+            session.say(&format!("wrote {}", write_map(folder, name, &map, &pixels)?.display()));
         }
-        let page = page(&found, &tables, &film.mean_f64(), &map);
-        stage.say(&format!("wrote {}", write_text(folder, "index.html", &page)?.display()));
+        let page = page(&found, &tables, &picture, &map);
+        session.say(&format!("wrote {}", write_text(folder, "index.html", &page)?.display()));
     }
     Ok(())
 }
@@ -63,7 +66,7 @@ fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
-/// What is shown, in the order of importance.
+/// Tables of a profile, in the order of importance.
 fn tables(p: &Profile) -> Vec<Table> {
     let mut all = Table::new([format!("{} on {}", p.method, p.scene), String::new()]);
     all.row(["samples per pixel".into(), format!("{} in {:.2} s", p.iterations, p.wall_s)]);
@@ -74,7 +77,7 @@ fn tables(p: &Profile) -> Vec<Table> {
         all.row(["of it not the bare backend's (replay)".into(), percent(ours)]);
     }
     all.row(["shadow rays that were blocked".into(), percent(p.shadow_blocked)]);
-    all.row(["light that blocked contributions would have brought".into(), percent(p.wasted.blocked_light)]);
+    all.row(["light that blocked contributions would have brought".into(), percent(p.visibility.blocked_light)]);
     all.row(["samples that were not finite".into(), p.non_finite.to_string()]);
 
     let mut phases = Table::new(["phase", "seconds", "share"]);
@@ -115,8 +118,9 @@ fn page(p: &Profile, tables: &[Table], picture: &[[f64; 3]], map: &CostMap) -> S
         page.table(table);
     }
     page.text(&format!(
-        "The replay sends the rays of one iteration ({} of {}) through a backend with nothing of the renderer around them, each thread's \
-         in its order, in turns with whole iterations; what is left of the renderer's time is its own.",
+        "The replay sends the rays of one iteration ({} of {}) through a backend with nothing of the renderer around \
+         them, each thread's in its order, in turns with whole iterations; what is left of the renderer's time is \
+         its own.",
         p.replayed[0],
         p.replayed[0] + p.replayed[1]
     ));
@@ -125,10 +129,10 @@ fn page(p: &Profile, tables: &[Table], picture: &[[f64; 3]], map: &CostMap) -> S
     page.markup(&picture_group(p.size, &[plain("picture", picture, "")], None));
     page.heading(2, "Cost and visibility");
     page.text(&format!(
-        "{} samples of a pixel in every {}th column and row, run again and counted. Cost: rays relative to the mean pixel ({:.1} rays), here at half of \
-         their value. Blocked: the share of a pixel's shadow rays with something in the way, and the light that they would have brought \
-         relative to all light.",
-        map.samples, map.step, p.wasted.rays_per_sample
+        "{} samples of a pixel in every {}th column and row, run again and counted. Cost: rays relative to the mean \
+         pixel ({:.1} rays), here at half of their value. Blocked: the share of a pixel's shadow rays with something \
+         in the way, and the light that they would have brought relative to all light.",
+        map.samples, map.step, p.visibility.rays_per_sample
     ));
     let half: Vec<[f64; 3]> = doubles(&map.cost_picture()).iter().map(|p| p.map(|v| 0.5 * v)).collect();
     let (blocked, light) = (doubles(&map.blocked_picture()), doubles(&map.lost_light_picture()));

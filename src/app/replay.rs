@@ -1,46 +1,29 @@
 //! `lightsieve replay`: one sample of one pixel, written down.
 
 use super::Failure;
-use super::cli::{Query, ReplayArgs};
-use super::config::Config;
-use super::report;
+use super::cli::ReplayArgs;
+use super::environment::Environment;
 use crate::integrators::Iteration;
-use crate::integrators::replay::{ContributionRecord as Contribution, Replay, VertexRecord};
+use crate::integrators::replay::{ContributionRecord, Replay, VertexRecord};
 use crate::math::{DVec3, Rgb, Vec3};
-use crate::prepared::{PrepareOptions, PreparedScene};
-use crate::scene::Diagnostics;
+use crate::render::job;
 
 pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
-    let (desc, mut diagnostics) = report::load(&args.scene, true)?;
-    let said = diagnostics.list.len();
-    let config = Config::of_integrator(
-        args.what.integrator.as_deref(),
-        args.what.max_depth,
-        &args.what.param,
-        &desc,
-        &mut diagnostics,
-    )?;
-    report::print(&Diagnostics { list: diagnostics.list.split_off(said) });
-    let options = PrepareOptions {
-        backend: Query::backend(args.what.query),
-        threads: 1,
-        size: args.what.size,
-        crop: args.what.crop,
-    };
-    let prepared = PreparedScene::build(desc, &options, &mut diagnostics);
-    if diagnostics.has_errors() {
-        report::print(&diagnostics);
-    }
-    let scene = prepared.map_err(Failure::input)?;
-    let (spec, params) = config;
+    let environment = Environment::new(None, true)?;
+    let runtime = environment.runtime();
+    let mut loaded = job::load(&args.scene.request(), runtime)?;
+    let method = args.sample.method().resolve(&loaded.desc, &mut loaded.diagnostics)?;
+    let prepared = job::prepare(loaded, &args.sample.prepare_options(&environment), runtime)?;
+    prepared.check_method(&method, runtime);
+    let scene = &prepared.scene;
     let [x, y] = args.pixel;
     let [x0, y0, width, height] = scene.window;
     if x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height {
         return Err(Failure::Input(format!("pixel {x},{y} is not in the picture ({x0},{y0},{width},{height})")));
     }
-    let iteration = Iteration { scene: &scene, seed: args.what.seed, index: args.iteration };
-    let replay = (spec.build)(&params).replay(&iteration, (x, y));
-    out!("{} pixel {x},{y} iteration {} seed {}", spec.name, args.iteration, args.what.seed);
+    let iteration = Iteration { scene, seed: args.sample.seed, index: args.iteration };
+    let replay = environment.pool.install(|| method.build().replay(&iteration, (x, y)));
+    out!("{} pixel {x},{y} iteration {} seed {}", method.spec.name, args.iteration, args.sample.seed);
     print(&replay, scene.centre);
     Ok(())
 }
@@ -90,7 +73,7 @@ fn vertex(letter: char, i: usize, v: &VertexRecord, centre: DVec3) {
     );
 }
 
-fn contribution(c: &Contribution, own: (u32, u32)) {
+fn contribution(c: &ContributionRecord, own: (u32, u32)) {
     out!(
         "  ({}, {}) raw {}  weight {:.6}  contributes {}{}{}",
         c.s,

@@ -1,16 +1,12 @@
 //! Diagnostics for people: file, line, the text underlined, what was expected.
 
-use super::Failure;
-use super::cli::SceneArgs;
-use crate::load::{CameraOptions, LoadOptions, load_scene};
-use crate::scene::{Diagnostic, Diagnostics, SceneDesc, Severity};
+use crate::scene::{Diagnostic, Diagnostics, Severity};
 use codespan_reporting::diagnostic::{Diagnostic as Shown, Label, Severity as Level};
 use codespan_reporting::files::SimpleFile;
 use codespan_reporting::term::{
     self,
     termcolor::{ColorChoice, StandardStream},
 };
-use glam::DVec3;
 use std::io::IsTerminal;
 
 /// Prints every message to standard error, then how many there were.
@@ -53,33 +49,5 @@ fn print_one(out: &mut StandardStream, d: &Diagnostic) {
     // A message that cannot be drawn is still said.
     if term::emit_to_write_style(out, &term::Config::default(), &file, &shown).is_err() {
         note!("{}: {}", d.code, d.message);
-    }
-}
-
-/// Loads the scene and prints what there is to say about it.
-pub(crate) fn load(args: &SceneArgs, quiet: bool) -> Result<(SceneDesc, Diagnostics), Failure> {
-    let vector = |v: Option<[f64; 3]>| v.map(DVec3::from);
-    let options = LoadOptions {
-        definitions: args.define.clone(),
-        strict: args.strict,
-        camera: CameraOptions {
-            origin: vector(args.camera_origin),
-            target: vector(args.camera_target),
-            up: vector(args.camera_up),
-            fov: args.camera_fov,
-            resolution: None,
-        },
-    };
-    match load_scene(&args.scene, &options) {
-        Ok((desc, diagnostics)) => {
-            if !quiet {
-                print(&diagnostics);
-            }
-            Ok((desc, diagnostics))
-        }
-        Err(failure) => {
-            print(&failure.diagnostics);
-            Err(if failure.io { Failure::Io(String::new()) } else { Failure::Input(String::new()) })
-        }
     }
 }

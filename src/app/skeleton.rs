@@ -47,9 +47,9 @@ pub(crate) fn write_lines(path: &Path, skeleton: &Skeleton, centre: DVec3) -> Re
 
 fn ply(skeleton: &Skeleton, centre: DVec3) -> String {
     let mut text = format!(
-        "ply\nformat ascii 1.0\ncomment nodes and edges of a skeleton of empty space\nelement vertex {}\nproperty double x\n\
-         property double y\nproperty double z\nproperty float radius\nelement edge {}\nproperty int vertex1\n\
-         property int vertex2\nend_header\n",
+        "ply\nformat ascii 1.0\ncomment nodes and edges of a skeleton of empty space\n\
+         element vertex {}\nproperty double x\nproperty double y\nproperty double z\nproperty float radius\n\
+         element edge {}\nproperty int vertex1\nproperty int vertex2\nend_header\n",
         skeleton.nodes.len(),
         skeleton.edges.len()
     );
@@ -99,8 +99,8 @@ impl Canvas {
     }
 }
 
-/// Draws the camera's view with a tint for each node that surfaces belong to (dark red: none), over it the edges in orange and the nodes
-/// in blue; what is behind something is faint.
+/// Draws the camera's view with a tint for each node that surfaces belong to (dark red: none), over it the edges in
+/// orange and the nodes in blue; what is behind something is faint.
 pub(crate) fn write_image(path: &Path, scene: &PreparedScene, skeleton: &Skeleton) -> Result<(), Failure> {
     let mut canvas = view(scene, skeleton);
     for [a, b] in &skeleton.edges {

@@ -77,11 +77,6 @@ impl Film {
         self.iterations
     }
 
-    /// Sets the number of iterations of a film whose sums are read from a file.
-    pub(crate) fn set_iterations(&mut self, iterations: u64) {
-        self.iterations = iterations;
-    }
-
     /// Calls `f(x, y, sum, sum of squares)` for every pixel; x and y count from the rendered part's corner.
     pub fn for_each_pixel(&self, mut f: impl FnMut(u32, u32, [f64; 3], [f64; 3])) {
         for tile in &self.tiles {

@@ -1,8 +1,9 @@
-//! Scenes × integrators against an earlier day: is anything slower, or noisier, than it was?
+//! Scenes × integrators against earlier measurements: is anything slower, or noisier, than it was?
 //!
-//! Time is seconds per iteration, freed of the machine's mood by a piece of plain arithmetic timed around each scene; error is the relMSE
-//! without the worst 0.1 % at the largest number of samples that both days have. Equal seeds make equal pictures, so an error
-//! that moves means an algorithm that has changed, and how much it may move by chance is known from the spread over seeds.
+//! Time is seconds per iteration over the time of a piece of plain arithmetic, measured around each scene, which
+//! takes out how fast the machine was at the time; error is the relMSE without the worst 0.1 % at the largest number
+//! of samples that both measurements have. Equal seeds make equal pictures, so an error that moves means an algorithm
+//! that has changed, and how much it may move by chance is known from the spread over seeds.
 
 use super::converge::Run;
 use super::machine::{Load, Machine};
@@ -14,7 +15,7 @@ use std::time::Instant;
 
 /// Standard errors that count as chance.
 const SIGMAS: f64 = 3.0;
-/// Changes below these count as none, whatever the spread says.
+/// Changes below these tolerances count as none, whatever the spread says.
 const TIME_TOLERANCE: f64 = 0.05;
 const ERROR_TOLERANCE: f64 = 0.02;
 
@@ -27,7 +28,7 @@ pub struct Row {
     pub method: String,
     /// Seconds per iteration, of each seed.
     pub seconds_per_iteration: Vec<f64>,
-    /// Nanoseconds of the piece of arithmetic when these were measured.
+    /// Nanoseconds of the piece of arithmetic around the measurement.
     pub calibration: f64,
     /// Samples per pixel, and the error of each seed there.
     pub errors: Vec<(u64, Vec<f64>)>,
@@ -35,18 +36,18 @@ pub struct Row {
     pub non_finite: u64,
 }
 
-/// A day's measurements.
+/// Measurements of one day.
 #[derive(Clone, Debug, Serialize)]
 pub struct Table {
     /// Machine.
     pub machine: Machine,
-    /// Who else used it.
+    /// Load of the machine by other programs.
     pub load: Load,
     /// Rows.
     pub rows: Vec<Row>,
 }
 
-/// An earlier day's, of which only the rows are compared.
+/// Earlier measurements, of which only the rows are compared.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Baseline {
     /// Rows.
@@ -58,9 +59,9 @@ pub struct Baseline {
 pub struct Change {
     /// New over old.
     pub ratio: f64,
-    /// What the ratio may be by chance.
+    /// Largest ratio that chance explains.
     pub bound: f64,
-    /// It is beyond.
+    /// The ratio is beyond the bound.
     pub regression: bool,
 }
 
@@ -122,7 +123,7 @@ fn change(old: (f64, f64), new: (f64, f64), tolerance: f64) -> Change {
     Change { ratio, bound, regression: ratio > bound }
 }
 
-/// Compares every row that both days have.
+/// Compares every row that both measurements have.
 pub fn against(old: &[Row], new: &[Row]) -> Vec<Verdict> {
     let pair = |row: &Row| {
         let before = old.iter().find(|r| r.scene == row.scene && r.method == row.method)?;
@@ -142,7 +143,8 @@ pub fn against(old: &[Row], new: &[Row]) -> Vec<Verdict> {
     new.iter().filter_map(pair).collect()
 }
 
-/// Nanoseconds of a step of plain arithmetic while all threads of the current pool do the same: the machine's mood.
+/// Nanoseconds of a step of plain arithmetic while all threads of the current pool do so too: the speed of the
+/// machine at the moment.
 pub fn calibrate() -> f64 {
     const STEPS: u64 = 4_000_000;
     let start = Instant::now();

@@ -1,4 +1,4 @@
-//! From runs to answers: mean curves over seeds, the time to reach an error, and speed-ups over a baseline.
+//! Evaluation of runs: mean curves over seeds, the time to reach an error, and speed-ups over a baseline.
 
 use super::converge::{Point, Run};
 use serde::Serialize;
@@ -82,8 +82,8 @@ pub fn mean_curve(runs: &[&Run], measure: Measure) -> Vec<Step> {
     curve
 }
 
-/// Seconds after which the error stays below `target`, on straight lines between the points in logarithms. None if that was not
-/// reached; the first point's time if it was below from the beginning on.
+/// Seconds after which the error stays below `target`, on straight lines between the points in logarithms. None if
+/// that was not reached; the first point's time if it was below from the beginning on.
 pub fn time_to_reach(curve: &[(f64, f64)], target: f64) -> Option<f64> {
     let last_above = curve.iter().rposition(|(_, e)| e.is_nan() || *e > target);
     let Some(i) = last_above else { return curve.first().map(|p| p.0) };
@@ -94,7 +94,7 @@ pub fn time_to_reach(curve: &[(f64, f64)], target: f64) -> Option<f64> {
     Some(if log.is_finite() { log.exp() } else { t1 })
 }
 
-/// How much faster a method gets to an error than the baseline does.
+/// Speed-up of a method over the baseline: how much sooner it reaches an error.
 #[derive(Clone, Debug, Serialize)]
 pub struct SpeedUp {
     /// Method.
@@ -109,12 +109,13 @@ pub struct SpeedUp {
     pub baseline_seconds: Option<f64>,
     /// Baseline's seconds over the method's.
     pub ratio: Option<f64>,
-    /// Smallest and largest ratio over seeds, each with its own error to reach if there is no target; none if not all get there.
+    /// Smallest and largest ratio over seeds, each with its own error to reach if there is no target; none if not all
+    /// get there.
     pub spread: Option<[f64; 2]>,
 }
 
-/// Speed-ups of all methods over `baseline`. Without a target it is, for each pair, the smallest error that both reach: the larger of
-/// the two errors at the end.
+/// Speed-ups of all methods over `baseline`. Without a target it is, for each pair, the smallest error that both
+/// reach: the larger of the two errors at the end.
 pub fn speed_ups(
     runs: &[Run],
     methods: &[String],

@@ -1,4 +1,4 @@
-//! What a stranger must know of the machine to make sense of a measurement, and who else was using it meanwhile.
+//! Facts about the machine that a reader of a measurement needs, and its load by other programs meanwhile.
 
 use super::report::Table;
 use crate::render::stats::cpu_seconds;
@@ -18,7 +18,8 @@ pub struct Machine {
     pub system: String,
     /// Version of this program.
     pub version: &'static str,
-    /// Commit that was checked out when the program was built, if that is known. The sources may have been changed since.
+    /// Commit that was checked out when the program was built, if that is known. The sources may have been changed
+    /// since.
     pub commit: Option<&'static str>,
     /// Compiler.
     pub compiler: Option<&'static str>,
@@ -69,7 +70,7 @@ pub struct Load {
     pub seconds: f64,
     /// Load average over a minute, before.
     pub average_before: Option<f64>,
-    /// The same, after.
+    /// Load average over a minute, after.
     pub average_after: Option<f64>,
     /// Share of all processor time that other processes took: measurements with more than a few percent are disturbed.
     pub others: Option<f64>,
@@ -90,7 +91,7 @@ impl LoadWatch {
         LoadWatch { start: Instant::now(), average: load_average(), before: now() }
     }
 
-    /// What there was since.
+    /// The load since then.
     pub fn finish(&self) -> Load {
         let others = self.before.zip(now()).map(|((busy0, all0, own0), (busy1, all1, own1))| {
             let (busy, all, own) = (busy1 - busy0, all1 - all0, own1 - own0);
@@ -119,8 +120,8 @@ impl Load {
     }
 }
 
-/// Processor nanoseconds of all threads of this process, where the system tells (Linux): exact but for threads that are running at
-/// the moment, unlike the ticks of [`cpu_seconds`].
+/// Processor nanoseconds of all threads of this process, where the system tells (Linux): exact but for threads that
+/// are running at the moment, unlike the ticks of [`cpu_seconds`].
 pub fn cpu_ns() -> Option<f64> {
     let tasks = std::fs::read_dir("/proc/self/task").ok()?;
     let of = |task: std::fs::DirEntry| {
@@ -132,8 +133,8 @@ pub fn cpu_ns() -> Option<f64> {
     (sum > 0.0).then_some(sum)
 }
 
-/// Runs `f` and tells the processor nanoseconds that it took on all threads, or else its wall time on `threads` threads. Other
-/// programs that want the processors do not count, unlike in wall time.
+/// Runs `f` and tells the processor nanoseconds that it took on all threads, or else its wall time on `threads`
+/// threads. Other programs that want the processors do not count, unlike in wall time.
 pub fn cpu_time<T>(threads: usize, f: impl FnOnce() -> T) -> (f64, T) {
     let (before, start) = (cpu_ns(), Instant::now());
     let out = f();

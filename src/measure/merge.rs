@@ -1,8 +1,8 @@
-//! Several renders of one picture made one: what ten machines have rendered in a night, each with its own seed.
+//! Several renders of one picture with seeds of their own become one: for example those of ten machines in a night.
 //!
-//! With n_i iterations, means m_i and variances of these means v_i: n = Σ n_i, m = Σ n_i m_i / n, and the sums of squares are those of
-//! all samples together, Σ (n_i (n_i − 1) v_i + n_i m_i²), so that the merged variance is what one render of all these samples
-//! would have reported.
+//! With n_i iterations, means m_i and variances of these means v_i: n = Σ n_i, m = Σ n_i m_i / n, and the sums of
+//! squares are those of all samples together, Σ (n_i (n_i − 1) v_i + n_i m_i²), so that the merged variance is what
+//! one render of all these samples would have reported.
 
 use crate::image::{ExrFile, Layer, Picture};
 use std::collections::BTreeSet;
@@ -21,19 +21,19 @@ pub enum MergeError {
         /// Which entry.
         what: &'static str,
     },
-    /// They differ in what must be the same.
+    /// They differ in an entry that must be equal.
     #[error("{file}: {what} is \"{found}\", but \"{expected}\" in the first file")]
     Differs {
         /// File.
         file: String,
-        /// What.
+        /// Name of the entry.
         what: &'static str,
         /// In this file.
         found: String,
         /// In the first.
         expected: String,
     },
-    /// The same samples twice would look like more than they are.
+    /// Two renders of one seed hold the same samples, which must not count twice.
     #[error("{file}: seed {seed} was merged already; renders of one seed hold the same samples")]
     Seed {
         /// File.
@@ -46,7 +46,7 @@ pub enum MergeError {
 /// Entries of the header that must be the same in all files.
 const SAME: [&str; 3] = ["integrator", "parameters", "unbiased"];
 
-struct Part<'a> {
+struct Input<'a> {
     file: &'a ExrFile,
     iterations: u64,
 }
@@ -57,7 +57,7 @@ struct Part<'a> {
 /// [`MergeError`].
 pub fn merge(files: &[(String, ExrFile)]) -> Result<Picture, MergeError> {
     let [(_, first), _, ..] = files else { return Err(MergeError::TooFew) };
-    let (mut seeds, mut parts) = (BTreeSet::new(), vec![]);
+    let (mut seeds, mut inputs) = (BTreeSet::new(), vec![]);
     let text = |file: &ExrFile, what: &str| file.text(&format!("lightsieve:{what}")).map(str::to_owned);
     for (name, file) in files {
         let header = |what: &'static str| text(file, what).ok_or(MergeError::Header { file: name.clone(), what });
@@ -81,17 +81,17 @@ pub fn merge(files: &[(String, ExrFile)]) -> Result<Picture, MergeError> {
         if file.colours("").is_none() || file.colours("variance").is_none() {
             return Err(MergeError::Header { file: name.clone(), what: "its picture and its variance" });
         }
-        parts.push(Part { file, iterations });
+        inputs.push(Input { file, iterations });
     }
     let mut picture = first.picture();
-    let n: u64 = parts.iter().map(|p| p.iterations).sum();
+    let n: u64 = inputs.iter().map(|p| p.iterations).sum();
     for layer in &mut picture.layers {
-        merge_layer(layer, &parts, n as f64);
+        merge_layer(layer, &inputs, n as f64);
     }
-    // What is not in all files is in none.
+    // Layers that are not in all files are left out.
     picture.layers.retain(|l| l.channels.iter().all(|(_, v)| !v.is_empty()));
-    let seconds: f64 = parts.iter().filter_map(|p| text(p.file, "renderSeconds")?.parse::<f64>().ok()).sum();
-    let lost: u64 = parts.iter().filter_map(|p| text(p.file, "nonFinite")?.parse::<u64>().ok()).sum();
+    let seconds: f64 = inputs.iter().filter_map(|p| text(p.file, "renderSeconds")?.parse::<f64>().ok()).sum();
+    let lost: u64 = inputs.iter().filter_map(|p| text(p.file, "nonFinite")?.parse::<u64>().ok()).sum();
     let seeds: Vec<String> = seeds.into_iter().collect();
     for (key, value) in [
         ("lightsieve:iterations", n.to_string()),
@@ -105,12 +105,12 @@ pub fn merge(files: &[(String, ExrFile)]) -> Result<Picture, MergeError> {
     Ok(picture)
 }
 
-fn merge_layer(layer: &mut Layer, parts: &[Part], n: f64) {
+fn merge_layer(layer: &mut Layer, inputs: &[Input], n: f64) {
     let is_variance = layer.name == "variance";
     for (channel, values) in &mut layer.channels {
         let full = |layer: &str| if layer.is_empty() { (*channel).to_owned() } else { format!("{layer}.{channel}") };
         let named = |layer: &str| -> Option<Vec<(&[f32], f64)>> {
-            parts.iter().map(|p| Some((p.file.channel(&full(layer))?, p.iterations as f64))).collect()
+            inputs.iter().map(|p| Some((p.file.channel(&full(layer))?, p.iterations as f64))).collect()
         };
         let (Some(own), Some(means)) = (named(&layer.name), if is_variance { named("") } else { Some(vec![]) }) else {
             values.clear();

@@ -1,46 +1,16 @@
-//! Integrators with parameters as one word: `bdpt:heuristic=power,max_depth=6`.
+//! Methods as text, an integrator with parameters in one word: `bdpt:heuristic=power,max_depth=6`.
 
-use crate::integrators::{IntegratorSpec, Params};
+use crate::render::MethodRequest;
 
-/// What was asked for, before anybody has looked whether it exists.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MethodText {
-    /// As typed; names the method everywhere.
-    pub label: String,
-    /// The integrator's name.
-    pub integrator: String,
-    /// Keys and values.
-    pub params: Vec<(String, String)>,
-}
-
-/// A method that takes part: an integrator with all its parameters.
-#[derive(Clone)]
-pub struct Contender {
-    /// What it is called in tables.
-    pub label: String,
-    /// Integrator.
-    pub spec: &'static IntegratorSpec,
-    /// Parameters.
-    pub params: Params,
-}
-
-impl Contender {
-    /// Parameters as text, in the order of declaration.
-    pub fn parameters(&self) -> String {
-        let pairs: Vec<String> = self.params.pairs().into_iter().map(|(k, v)| format!("{k}={v}")).collect();
-        pairs.join(" ")
-    }
-}
-
-/// Reads a list of methods: names, each with `:key=value` and further `,key=value`. A comma also stands inside of values
-/// (`techniques=all,-0:*`): what begins with a letter and is no `key=value` begins a new method, all else goes on with the
-/// one before.
+/// Reads a list of methods: names, each with `:key=value` and further `,key=value`. The text names the method in
+/// tables. A comma also stands inside of values (`techniques=all,-0:*`): a piece that begins with a letter and is no
+/// `key=value` begins a new method, every other piece belongs to the method before it.
 ///
 /// # Errors
-/// What was expected.
-pub fn parse_methods(text: &str) -> Result<Vec<MethodText>, String> {
+/// The expected form, as text.
+pub fn parse_methods(text: &str) -> Result<Vec<MethodRequest>, String> {
     let expected = |what: &str| format!("\"{what}\": expected NAME or NAME:key=value, separated by commas");
-    let mut methods: Vec<MethodText> = vec![];
+    let (mut methods, mut labels): (Vec<MethodRequest>, Vec<String>) = (vec![], vec![]);
     for piece in text.split(',') {
         let key_value = |text: &str| text.split_once('=').map(|(k, v)| (k.to_owned(), v.to_owned()));
         let word = piece.starts_with(|c: char| c.is_ascii_alphabetic());
@@ -51,10 +21,11 @@ pub fn parse_methods(text: &str) -> Result<Vec<MethodText>, String> {
                 Some(p) => vec![key_value(p).ok_or_else(|| expected(piece))?],
                 None => vec![],
             };
-            methods.push(MethodText { label: piece.to_owned(), integrator: name.to_owned(), params });
+            methods.push(MethodRequest { integrator: Some(name.to_owned()), params, ..MethodRequest::default() });
+            labels.push(piece.to_owned());
             continue;
         }
-        let method = methods.last_mut().ok_or_else(|| expected(piece))?;
+        let (method, label) = methods.last_mut().zip(labels.last_mut()).ok_or_else(|| expected(piece))?;
         match (word, key_value(piece), method.params.last_mut()) {
             (true, Some(pair), _) => method.params.push(pair),
             (false, _, Some((_, value))) if !piece.is_empty() => {
@@ -63,10 +34,12 @@ pub fn parse_methods(text: &str) -> Result<Vec<MethodText>, String> {
             }
             _ => return Err(expected(piece)),
         }
-        method.label.push(',');
-        method.label.push_str(piece);
+        label.push(',');
+        label.push_str(piece);
     }
-    let mut labels: Vec<&str> = methods.iter().map(|m| m.label.as_str()).collect();
+    for (method, label) in methods.iter_mut().zip(&labels) {
+        method.label = Some(label.clone());
+    }
     labels.sort_unstable();
     match labels.windows(2).find(|w| w[0] == w[1]) {
         Some(w) => Err(format!("{} is named twice", w[0])),
@@ -81,10 +54,10 @@ mod tests {
     #[test]
     fn commas_separate_methods_parameters_and_parts_of_values() {
         let found = parse_methods("path,bdpt:techniques=all,-0:*,+2:3,max_depth=6,light").unwrap();
-        let labels: Vec<&str> = found.iter().map(|m| m.label.as_str()).collect();
+        let labels: Vec<&str> = found.iter().filter_map(|m| m.label.as_deref()).collect();
         assert_eq!(labels, ["path", "bdpt:techniques=all,-0:*,+2:3,max_depth=6", "light"]);
         let pair = |k: &str, v: &str| (k.to_owned(), v.to_owned());
-        assert_eq!(found[1].integrator, "bdpt");
+        assert_eq!(found[1].integrator.as_deref(), Some("bdpt"));
         assert_eq!(found[1].params, [pair("techniques", "all,-0:*,+2:3"), pair("max_depth", "6")]);
         assert!(found[0].params.is_empty() && found[2].params.is_empty());
     }

@@ -1,8 +1,10 @@
-//! Measuring: error against time, where the time goes, and what a stranger needs to check either.
+//! Measurements: error against time, profiles of the time, and the facts about the machine that a reader needs to
+//! judge both.
 //!
-//! Nothing in here prints or reads a command line. [`converge`] runs methods side by side, [`curve`] makes answers of what they
-//! left and [`study`] puts them together, [`profile`] looks into one method, [`mod@bench`] compares with an earlier day, [`merge`] adds renders up, [`report`]
-//! writes it all into one file that a browser opens.
+//! Nothing in this room prints or reads a command line. [`converge`] runs methods side by side, [`curve`] derives
+//! mean curves and speed-ups from their runs, [`study`] puts these together, [`profile`] examines one method,
+//! [`mod@bench`] compares with earlier measurements, [`merge`] adds renders up, and [`report`] writes everything into
+//! one HTML file.
 
 pub mod bench;
 pub mod converge;
@@ -18,5 +20,5 @@ pub mod study;
 pub mod visibility;
 
 pub use machine::{LoadWatch, Machine};
-pub use method::Contender;
+pub use method::parse_methods;
 pub use reference::Reference;

@@ -1,17 +1,17 @@
-//! A backend that writes down what it is asked, so that the very same questions can be put to bare backends afterwards, with nothing
-//! of a renderer around them.
+//! A backend that records its queries, so that the very same queries can be sent through bare backends afterwards,
+//! with nothing of a renderer around them.
 
 use crate::ray::{Hit, Ray, RayQuery, SegmentPacket};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Most questions that are kept; an iteration that asks more is kept in part.
-const MOST: usize = 4_000_000;
+/// Largest number of recorded queries; of an iteration with more only a part is recorded.
+const MAX_QUERIES: usize = 4_000_000;
 
-/// What one thread asked, in its order.
+/// Queries of one thread, in their order.
 #[derive(Default)]
 struct Log {
-    order: Vec<Question>,
+    order: Vec<QueryKind>,
     rays: Vec<Ray>,
     packets: Vec<SegmentPacket>,
     /// Rays that were not kept.
@@ -19,26 +19,26 @@ struct Log {
 }
 
 #[derive(Clone, Copy)]
-enum Question {
+enum QueryKind {
     Closest,
     Occluded,
     Packet,
 }
 
-/// Everything that was asked, by thread.
+/// All recorded queries, by thread.
 #[derive(Default)]
 pub struct Recording {
     logs: Vec<Log>,
 }
 
-/// Passes questions on and keeps a copy. Must be asked from the thread pool that it was made for.
+/// Passes queries on and keeps a copy. All queries must come from the thread pool that it was made for.
 pub struct Recorder {
     inner: Arc<dyn RayQuery>,
     logs: Arc<Vec<Mutex<Log>>>,
-    most: usize,
+    max_per_thread: usize,
 }
 
-/// Backends that change places are shared.
+/// A shared backend is a backend, so that the one in use can go behind a recorder and come back.
 impl RayQuery for Arc<dyn RayQuery> {
     fn describe(&self) -> String {
         (**self).describe()
@@ -62,25 +62,25 @@ impl RayQuery for Arc<dyn RayQuery> {
     }
 }
 
-/// The recorder's other end.
+/// The recorder's logs, to be taken when it has done its work.
 pub struct Tape(Arc<Vec<Mutex<Log>>>);
 
 impl Recorder {
     /// A recorder for so many threads, and its tape.
     pub fn new(inner: Arc<dyn RayQuery>, threads: usize) -> (Recorder, Tape) {
         let logs: Arc<Vec<Mutex<Log>>> = Arc::new((0..threads.max(1)).map(|_| Mutex::default()).collect());
-        (Recorder { inner, logs: logs.clone(), most: MOST / threads.max(1) }, Tape(logs))
+        (Recorder { inner, logs: logs.clone(), max_per_thread: MAX_QUERIES / threads.max(1) }, Tape(logs))
     }
 
     fn log(&self) -> MutexGuard<'_, Log> {
         let thread = rayon::current_thread_index().unwrap_or(0) % self.logs.len();
-        // A log is whole between any two questions, whatever happened to the thread.
+        // A log is whole between any two queries, whatever happened to the thread.
         self.logs[thread].lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn keep(&self, rays: u64, write: impl FnOnce(&mut Log)) {
         let mut log = self.log();
-        if log.order.len() < self.most { write(&mut log) } else { log.beyond += rays }
+        if log.order.len() < self.max_per_thread { write(&mut log) } else { log.beyond += rays }
     }
 }
 
@@ -91,7 +91,7 @@ impl RayQuery for Recorder {
 
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.keep(1, |log| {
-            log.order.push(Question::Closest);
+            log.order.push(QueryKind::Closest);
             log.rays.push(*ray);
         });
         self.inner.closest(ray)
@@ -99,7 +99,7 @@ impl RayQuery for Recorder {
 
     fn occluded(&self, ray: &Ray) -> bool {
         self.keep(1, |log| {
-            log.order.push(Question::Occluded);
+            log.order.push(QueryKind::Occluded);
             log.rays.push(*ray);
         });
         self.inner.occluded(ray)
@@ -107,7 +107,7 @@ impl RayQuery for Recorder {
 
     fn occluded_packet(&self, packet: &SegmentPacket) -> (u16, u32) {
         self.keep(packet.len as u64, |log| {
-            log.order.push(Question::Packet);
+            log.order.push(QueryKind::Packet);
             log.packets.push(packet.clone());
         });
         self.inner.occluded_packet(packet)
@@ -115,7 +115,7 @@ impl RayQuery for Recorder {
 }
 
 impl Tape {
-    /// Takes what was recorded.
+    /// Takes the recording.
     pub fn take(self) -> Recording {
         let take = |log: &Mutex<Log>| std::mem::take(&mut *log.lock().unwrap_or_else(PoisonError::into_inner));
         Recording { logs: self.0.iter().map(take).collect() }
@@ -129,21 +129,21 @@ impl Recording {
         self.logs.iter().map(of).sum()
     }
 
-    /// Rays that there was no room for.
+    /// Rays that were left out for lack of memory.
     pub fn beyond(&self) -> u64 {
         self.logs.iter().map(|l| l.beyond).sum()
     }
 
-    /// Asks it all again, each thread's questions on one thread of the current pool; returns how many rays met something, which must not
-    /// depend on the backend.
+    /// Repeats all queries, those of each thread on one thread of the current pool; returns how many rays met
+    /// something, which must not depend on the backend.
     pub fn play(&self, query: &dyn RayQuery) -> u64 {
         let one = |log: &Log| {
             let (mut rays, mut packets, mut met) = (log.rays.iter(), log.packets.iter(), 0u64);
-            for question in &log.order {
-                met += match question {
-                    Question::Packet => packets.next().map_or(0, |p| query.occluded_packet(p).0.count_ones().into()),
-                    Question::Closest => rays.next().map_or(0, |r| u64::from(query.closest(r).is_some())),
-                    Question::Occluded => rays.next().map_or(0, |r| u64::from(query.occluded(r))),
+            for kind in &log.order {
+                met += match kind {
+                    QueryKind::Packet => packets.next().map_or(0, |p| query.occluded_packet(p).0.count_ones().into()),
+                    QueryKind::Closest => rays.next().map_or(0, |r| u64::from(query.closest(r).is_some())),
+                    QueryKind::Occluded => rays.next().map_or(0, |r| u64::from(query.occluded(r))),
                 };
             }
             met

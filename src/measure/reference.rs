@@ -1,16 +1,15 @@
-//! References: what errors are measured against. One that was rendered is kept under the hash of its scene and settings.
+//! References: the pictures that errors are measured against. A rendered reference is kept in a cache under the hash
+//! of its scene and settings.
 
-use super::Contender;
-use crate::film::Film;
 use crate::image::{Encoding, ExrFile, read_image, write_picture};
 use crate::math::hash::mix64;
 use crate::prepared::PreparedScene;
-use crate::render::{Budget, Progress, Stop, output, render, scene_hash};
+use crate::render::{Budget, JobError, Method, Plan, Runtime, Stop, output, run, scene_hash};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
-/// Seed of references: far from those that people type, so that a reference shares no sample with what it judges.
+/// Seed of references: far from the seeds that people type, so that a reference shares no sample with the pictures
+/// compared to it.
 pub const REFERENCE_SEED: u64 = 0x5eed_7e57;
 
 /// A picture to compare with.
@@ -20,28 +19,29 @@ pub struct Reference {
     pub size: [u32; 2],
     /// Linear colours, row by row.
     pub pixels: Vec<[f64; 3]>,
-    /// What is known of it.
+    /// Facts about its making.
     pub facts: ReferenceFacts,
 }
 
-/// What a reader of a table must know of its reference.
+/// Facts about a reference that a reader of a table needs.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReferenceFacts {
     /// File.
     pub file: PathBuf,
-    /// How it was made, as far as its header tells.
+    /// Integrator and parameters, if its header tells.
     pub integrator: Option<String>,
     /// Samples per pixel.
     pub iterations: Option<String>,
     /// Seeds.
     pub seeds: Option<String>,
-    /// Its own error, from its variance layer. Samples are stratified over iterations, so that this is an upper estimate.
+    /// Error of the reference itself, from its variance layer. Samples are stratified over iterations, so that this
+    /// is an upper estimate.
     pub own: Option<OwnError>,
     /// Pixels that are not finite; errors leave them out.
     pub non_finite: u64,
 }
 
-/// Estimated error of a picture against what it converges to.
+/// Estimated error of a picture against its expectation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OwnError {
     /// Mean of v / (r² + 0.01), v the variance of the mean.
@@ -69,9 +69,22 @@ pub enum ReferenceError {
         /// Why.
         source: std::io::Error,
     },
-    /// Ctrl-C.
-    #[error("interrupted")]
-    Interrupted,
+    /// It cannot be rendered, or was interrupted.
+    #[error("{0}")]
+    Job(#[from] JobError),
+}
+
+/// A reference to be rendered.
+#[derive(Clone, Copy)]
+pub struct ReferenceTask<'a> {
+    /// Scene.
+    pub scene: &'a PreparedScene,
+    /// Name of the scene.
+    pub name: &'a str,
+    /// Method, which should be unbiased and render all of the scene.
+    pub method: &'a Method,
+    /// Limits of the render.
+    pub budget: Budget,
 }
 
 impl OwnError {
@@ -129,17 +142,12 @@ impl Reference {
         Ok(Reference { size: [image.width, image.height], pixels, facts })
     }
 
-    /// The reference of a scene from the cache, or rendered and put there. Runs on the current thread pool.
+    /// The reference of a scene from the cache in `folder`, or rendered and put there.
     ///
     /// # Errors
     /// If the cache cannot be used, or the render was interrupted.
-    pub fn cached(
-        scene: &PreparedScene,
-        (name, method, budget): (&str, &Contender, Budget),
-        folder: &Path,
-        interrupt: &AtomicBool,
-        mut watch: impl FnMut(&Progress),
-    ) -> Result<Reference, ReferenceError> {
+    pub fn cached(task: &ReferenceTask, folder: &Path, runtime: Runtime) -> Result<Reference, ReferenceError> {
+        let ReferenceTask { scene, name, method, budget } = *task;
         let settings = format!(
             "{} {} {:?} {:?} {:?} {}",
             method.spec.name,
@@ -155,22 +163,21 @@ impl Reference {
             return Reference::read(&path);
         }
         std::fs::create_dir_all(folder).map_err(|source| ReferenceError::Folder { path: folder.to_owned(), source })?;
-        let mut film = Film::new(scene.window);
-        let mut integrator = (method.spec.build)(&method.params);
-        let outcome = render(scene, &mut *integrator, &mut film, REFERENCE_SEED, budget, interrupt, |p, _, _| watch(p));
-        if outcome.stop == Stop::Interrupted {
-            return Err(ReferenceError::Interrupted);
+        let plan = Plan { budget, ..Plan::new(method.clone(), REFERENCE_SEED) };
+        let rendered = run::run(scene, &plan, runtime)?;
+        if rendered.outcome.stop == Stop::Interrupted {
+            return Err(JobError::Interrupted.into());
         }
         let metadata = [
             ("scene", name.to_owned()),
             ("integrator", method.spec.name.to_owned()),
             ("parameters", method.parameters()),
-            ("iterations", film.iterations().to_string()),
+            ("iterations", rendered.film.iterations().to_string()),
             ("seed", REFERENCE_SEED.to_string()),
-            ("renderSeconds", format!("{:.3}", outcome.wall.as_secs_f64())),
+            ("renderSeconds", format!("{:.3}", rendered.outcome.wall.as_secs_f64())),
         ];
         let metadata = metadata.into_iter().map(|(k, v)| (format!("lightsieve:{k}"), v)).collect();
-        write_picture(&path, &output::picture(&film, vec![], metadata), 0.0)?;
+        write_picture(&path, &output::picture(&rendered.film, vec![], metadata), 0.0)?;
         Reference::read(&path)
     }
 }

@@ -1,26 +1,38 @@
-//! A study of convergence put together: what was run on what, the answers, and how they are shown.
+//! A study of convergence: methods, scenes, runs and speed-ups, as tables and as a page.
 
 use super::converge::Run;
 use super::curve::{MEASURES, Measure, SpeedUp, mean_curve, runs_of, speed_ups};
 use super::machine::{Load, Machine};
 use super::reference::{OwnError, Reference, ReferenceFacts};
 use super::report::{Line, Page, Plot, Shown, Table, picture_group};
+use crate::render::Method;
 use serde::Serialize;
 
-/// A method as it was run.
+/// A method as the study shows it.
 #[derive(Clone, Debug, Serialize)]
-pub struct Method {
-    /// What it is called.
+pub struct MethodSummary {
+    /// Name in tables.
     pub label: String,
     /// Integrator.
     pub integrator: &'static str,
     /// All its parameters.
     pub parameters: String,
-    /// Its expectation is right.
+    /// Its expectation is the rendering equation's solution.
     pub unbiased: bool,
 }
 
-/// One scene.
+impl From<&Method> for MethodSummary {
+    fn from(method: &Method) -> MethodSummary {
+        MethodSummary {
+            label: method.label.clone(),
+            integrator: method.spec.name,
+            parameters: method.parameters(),
+            unbiased: method.spec.unbiased,
+        }
+    }
+}
+
+/// Convergence on one scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneStudy {
     /// Name.
@@ -31,28 +43,28 @@ pub struct SceneStudy {
     pub size: [u32; 2],
     /// Triangles.
     pub triangles: usize,
-    /// What was compared with.
+    /// Facts about the reference.
     pub reference: ReferenceFacts,
     /// Methods.
-    pub methods: Vec<Method>,
+    pub methods: Vec<MethodSummary>,
     /// All points of all runs.
     pub runs: Vec<Run>,
     /// Speed-ups over the baseline.
     pub speed_ups: Vec<SpeedUp>,
-    /// Who else used the machine.
+    /// Load of the machine by other programs.
     pub load: Load,
 }
 
-/// Everything. The keys are a contract.
+/// Convergence on several scenes. The keys are a contract.
 #[derive(Clone, Debug, Serialize)]
 pub struct Study {
-    /// What was typed.
+    /// Command line.
     pub command: String,
     /// Seconds that every method had with every seed.
     pub seconds: f64,
     /// Seeds.
     pub seeds: Vec<u64>,
-    /// The method that others are compared with.
+    /// Label of the method that others are compared with.
     pub baseline: String,
     /// Machine.
     pub machine: Machine,
@@ -69,7 +81,7 @@ impl SceneStudy {
         self.speed_ups = measures.flat_map(of).collect();
     }
 
-    /// Where every method is at the end: means over seeds, and the spread of the relMSE.
+    /// Errors of every method at the end: means over seeds, and half of the spread.
     pub fn end_table(&self) -> Table {
         let head = ["method", "samples", "seconds", "Mrays/s"].map(String::from).to_vec();
         let names = MEASURES.iter().map(|m| m.name.to_owned());
@@ -128,7 +140,7 @@ impl SceneStudy {
             };
             Some(("error of the reference (upper estimate)".to_owned(), level))
         };
-        let line = |method: &Method, measure: Measure| Line {
+        let line = |method: &MethodSummary, measure: Measure| Line {
             name: method.label.clone(),
             points: mean_curve(&runs_of(&self.runs, &method.label), measure)
                 .iter()
@@ -155,7 +167,7 @@ impl SceneStudy {
             self.load.sentence()
         ));
         page.text(&format!("{}.", self.reference.sentence()));
-        let of_method = |method: &Method| runs_of(&self.runs, &method.label).into_iter().next();
+        let of_method = |method: &MethodSummary| runs_of(&self.runs, &method.label).into_iter().next();
         let mut shown: Vec<Shown> = self
             .methods
             .iter()
@@ -213,16 +225,17 @@ impl Study {
         let mut page = Page::new(&format!("Convergence: {}", names.join(", ")));
         page.command(&self.command);
         page.text(&format!(
-            "Every method had {} seconds for each of {} seeds ({:?}), in turns with the others. Times are wall seconds of iterations, \
-             everything included but loading the scene and taking errors.",
+            "Every method had {} seconds for each of {} seeds ({:?}), in turns with the others. Times are wall \
+             seconds of iterations, everything included but loading the scene and taking errors.",
             self.seconds,
             self.seeds.len(),
             self.seeds
         ));
         page.text(
-            "d is the difference from the reference r: relMSE is the mean of d²/(r² + 0.01) (trimmed: without the worst 0.1 % of the pixels), MAPE of |d|/(r + 0.01), L1 of |d|, over pixels and \
-             channels; FLIP is LDR-FLIP of the pictures clipped to [0, 1]. A speed-up is the baseline's time to reach an error over the \
-             method's; where no error was asked for it is the smallest that both reach.",
+            "d is the difference from the reference r: relMSE is the mean of d²/(r² + 0.01) (trimmed: without the \
+             worst 0.1 % of the pixels), MAPE of |d|/(r + 0.01), L1 of |d|, over pixels and channels; FLIP is \
+             LDR-FLIP of the pictures clipped to [0, 1]. A speed-up is the baseline's time to reach an error over \
+             the method's; where no error was asked for it is the smallest that both reach.",
         );
         page.table(&self.machine.table());
         page.table(&self.methods_table());

@@ -17,9 +17,9 @@ const RAYS: u64 = 16;
 pub enum Aov {
     /// Approximate albedo of the first surface.
     Albedo,
-    /// Its shading normal in world space.
+    /// Shading normal of the first surface in world space.
     Normal,
-    /// Its distance from the camera.
+    /// Distance of the first surface from the camera.
     Depth,
 }
 
@@ -30,6 +30,9 @@ impl Aov {
 
 /// Renders the layers asked for, for the window of `film`. Pixels (or parts of them) that see nothing are zero.
 pub fn layers(scene: &PreparedScene, film: &Film, seed: u64, wanted: &[Aov]) -> Vec<Layer> {
+    if wanted.is_empty() {
+        return vec![];
+    }
     let width = film.width;
     let pixels: Vec<[f32; 7]> = (0..film.width * film.height)
         .into_par_iter()

@@ -1,32 +1,71 @@
-//! Checkpoints: the film's sums in full precision, and what must be the same for a resumed render to go on bit by bit.
+//! Checkpoints: the films of a render in full precision, and everything that must be equal for a resumed render to go
+//! on bit by bit.
 //!
-//! A file is one line of JSON (what was rendered), then the sums: for each tile in order, for each pixel, three sums and three
-//! sums of squares as little-endian doubles, then the number of non-finite samples as a 64-bit integer; last, what the
-//! integrator has learnt, in words of its own.
+//! A file is a line with the version of the format, then the identity of the render and the state of each estimator
+//! (postcard encoding), then the CRC-32 of everything before it (four bytes, little-endian). The state of an
+//! integrator is an opaque block of bytes here. A file of another version, of another render, or with a wrong
+//! checksum is refused.
 
 use super::scene_hash::scene_hash;
-use crate::film::{Film, NonFinite};
+use super::{Estimator, Plan};
+use crate::film::Film;
 use crate::image::atomic_write;
-use crate::integrators::{self, Params};
 use crate::prepared::PreparedScene;
 use serde::{Deserialize, Serialize};
-use std::io::Read;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-const FORMAT: &str = "lightsieve-checkpoint-2";
+/// Beginning of every checkpoint; the version follows.
+const NAME: &str = "lightsieve-checkpoint-";
+/// Version of the format.
+const VERSION: u32 = 3;
+/// Bytes at the beginning of a file that are searched for [`NAME`]: version 2 had it behind a bracket and a key.
+const HEAD: usize = 64;
+/// Bytes of the checksum.
+const CHECKSUM: usize = 4;
 
-/// What a checkpoint belongs to.
+/// Everything that two runs must have in common to be parts of one render.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Checkpoint {
-    format: String,
+pub struct RenderIdentity {
     integrator: String,
     params: Vec<(String, String)>,
     seed: u64,
+    /// The render has two halves with seeds of their own, see [`super::error_target`].
+    error_target: bool,
     film_size: [u32; 2],
     window: [u32; 4],
     scene_hash: u64,
-    iterations: u64,
-    non_finite_at: Vec<NonFinite>,
+    backend: String,
+}
+
+/// A film and the state of the integrator that rendered it.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct SavedEstimator {
+    /// Film.
+    pub film: Film,
+    /// State of the integrator, see [`crate::integrators::Integrator::state`].
+    pub state: Vec<u8>,
+}
+
+/// Contents of a file, as it is read.
+#[derive(Deserialize)]
+struct Contents {
+    identity: RenderIdentity,
+    estimators: Vec<SavedEstimator>,
+}
+
+/// Contents of a file, as it is written: the same fields, borrowed.
+#[derive(Serialize)]
+struct ContentsRef<'a> {
+    identity: &'a RenderIdentity,
+    estimators: Vec<EstimatorRef<'a>>,
+}
+
+/// A [`SavedEstimator`], borrowed.
+#[derive(Serialize)]
+struct EstimatorRef<'a> {
+    film: &'a Film,
+    state: Vec<u8>,
 }
 
 /// A checkpoint that cannot be used or written.
@@ -40,119 +79,136 @@ pub enum CheckpointError {
         /// Why.
         source: std::io::Error,
     },
-    /// Not a checkpoint, or a damaged one.
+    /// No checkpoint, one of another version, or a damaged one.
     #[error("{}: {reason}", path.display())]
     Format {
         /// File.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason.
         reason: String,
     },
-    /// A checkpoint of something else.
-    #[error("{}: the checkpoint is of another render ({what})", path.display())]
+    /// A checkpoint of another render.
+    #[error("{}: the checkpoint is of another render ({difference})", path.display())]
     Other {
         /// File.
         path: PathBuf,
-        /// What differs.
-        what: &'static str,
+        /// First difference.
+        difference: &'static str,
     },
 }
 
-impl Checkpoint {
-    /// Describes a render.
-    pub fn new(scene: &PreparedScene, integrator: &str, params: &[(&'static str, String)], seed: u64) -> Checkpoint {
-        Checkpoint {
-            format: FORMAT.into(),
-            integrator: integrator.into(),
-            params: params.iter().map(|(k, v)| ((*k).to_string(), v.clone())).collect(),
-            seed,
+impl RenderIdentity {
+    /// The identity of a planned render of `scene`.
+    pub fn new(scene: &PreparedScene, plan: &Plan) -> RenderIdentity {
+        let params = plan.method.params.pairs();
+        RenderIdentity {
+            integrator: plan.method.spec.name.into(),
+            params: params.into_iter().map(|(k, v)| (k.to_owned(), v)).collect(),
+            seed: plan.seed,
+            error_target: plan.error_target.is_some(),
             film_size: scene.film_size,
             window: scene.window,
             scene_hash: scene_hash(scene),
-            iterations: 0,
-            non_finite_at: vec![],
+            backend: scene.query.describe(),
         }
     }
 
-    /// The parameters have these values, by their present or earlier names.
-    fn has_params(&self, found: &[(String, String)]) -> bool {
-        if found.len() != self.params.len() {
-            return false;
-        }
-        let Some(spec) = integrators::find(&self.integrator) else { return found == self.params };
-        let named = |pairs: &[(String, String)]| Params::with(spec, pairs).ok();
-        named(found).is_some_and(|params| Some(params) == named(&self.params))
+    /// The first difference from another identity, in words about the other.
+    fn difference(&self, other: &RenderIdentity) -> Option<&'static str> {
+        let target = if other.error_target { "with an error target" } else { "without an error target" };
+        let equal = [
+            ("another integrator", other.integrator == self.integrator),
+            ("other parameters of the integrator", other.params == self.params),
+            ("another seed", other.seed == self.seed),
+            (target, other.error_target == self.error_target),
+            ("another picture size", other.film_size == self.film_size),
+            ("another crop window", other.window == self.window),
+            ("another scene", other.scene_hash == self.scene_hash),
+            ("another ray-query backend", other.backend == self.backend),
+        ];
+        equal.into_iter().find(|&(_, equal)| !equal).map(|(what, _)| what)
     }
 
-    /// Writes the film and what the integrator has learnt; whole or not at all.
+    /// Number of estimators of the render.
+    fn estimators(&self) -> usize {
+        if self.error_target { 2 } else { 1 }
+    }
+
+    /// Writes films and states of all estimators; whole or not at all.
     ///
     /// # Errors
     /// If the file system refuses.
-    pub fn save(&self, path: &Path, film: &Film, state: &[u8]) -> Result<(), CheckpointError> {
-        let header = Checkpoint { iterations: film.iterations(), non_finite_at: film.non_finite().1, ..self.clone() };
-        let io = |source| CheckpointError::Io { path: path.to_owned(), source };
-        let json = serde_json::to_string(&header).map_err(|e| io(e.into()))?;
-        atomic_write(path, |w| {
-            writeln!(w, "{json}")?;
-            for tile in &film.tiles {
-                let mut bytes = Vec::with_capacity(tile.sums.len() * 48 + 8);
-                for (sum, square) in tile.sums.iter().zip(&tile.squares) {
-                    for v in sum.iter().chain(square) {
-                        bytes.extend_from_slice(&v.to_le_bytes());
-                    }
-                }
-                bytes.extend_from_slice(&tile.non_finite.to_le_bytes());
-                w.write_all(&bytes)?;
-            }
-            w.write_all(state)?;
-            Ok(())
+    pub fn save(&self, path: &Path, estimators: &[Estimator]) -> Result<(), CheckpointError> {
+        let estimators = estimators.iter().map(|e| EstimatorRef { film: &e.film, state: e.integrator.state() });
+        let contents = ContentsRef { identity: self, estimators: estimators.collect() };
+        atomic_write(path, |file| {
+            let mut out = BufWriter::new(Checksummed { file, checksum: crc32fast::Hasher::new() });
+            writeln!(out, "{NAME}{VERSION}")?;
+            postcard::to_io(&contents, &mut out).map_err(std::io::Error::other)?;
+            let Checksummed { file, checksum } = out.into_inner().map_err(|e| e.into_error())?;
+            file.write_all(&checksum.finalize().to_le_bytes())
         })
-        .map_err(io)
+        .map_err(|source| CheckpointError::Io { path: path.to_owned(), source })
     }
 
-    /// Reads a film and an integrator's state back, if the checkpoint is of this render.
+    /// Reads the estimators back, if the checkpoint is of this render.
     ///
     /// # Errors
     /// If it is not, or is damaged.
-    pub fn load(&self, path: &Path) -> Result<(Film, Vec<u8>), CheckpointError> {
-        let io = |source| CheckpointError::Io { path: path.to_owned(), source };
-        let format = |reason: &str| CheckpointError::Format { path: path.to_owned(), reason: reason.into() };
-        let mut data = Vec::new();
-        std::fs::File::open(path).and_then(|mut f| f.read_to_end(&mut data)).map_err(io)?;
-        let end = data.iter().position(|&b| b == b'\n').ok_or_else(|| format("not a lightsieve checkpoint"))?;
-        let found: Checkpoint =
-            serde_json::from_slice(&data[..end]).map_err(|_| format("not a lightsieve checkpoint"))?;
-        if found.format != self.format {
-            return Err(format(&format!("format {} is not {FORMAT}", found.format)));
+    pub fn load(&self, path: &Path) -> Result<Vec<SavedEstimator>, CheckpointError> {
+        let data = std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
+        let found = decode(&data).map_err(|reason| CheckpointError::Format { path: path.to_owned(), reason })?;
+        if let Some(difference) = self.difference(&found.identity) {
+            return Err(CheckpointError::Other { path: path.to_owned(), difference });
         }
-        let same = [
-            ("another integrator", found.integrator == self.integrator),
-            ("other parameters of the integrator", self.has_params(&found.params)),
-            ("another seed", found.seed == self.seed),
-            ("another picture size", found.film_size == self.film_size),
-            ("another crop window", found.window == self.window),
-            ("another scene", found.scene_hash == self.scene_hash),
-        ];
-        if let Some((what, _)) = same.into_iter().find(|&(_, same)| !same) {
-            return Err(CheckpointError::Other { path: path.to_owned(), what });
+        let whole = found.estimators.iter().all(|e| e.film.is_of_window(self.window));
+        if !whole || found.estimators.len() != self.estimators() {
+            let reason = "the checkpoint is damaged: its films are not those of this render".into();
+            return Err(CheckpointError::Format { path: path.to_owned(), reason });
         }
+        Ok(found.estimators)
+    }
+}
 
-        let mut film = Film::new(self.window);
-        film.set_iterations(found.iterations);
-        let mut words = data[end + 1..].chunks_exact(8).map(|c| u64::from_le_bytes(c.try_into().unwrap_or_default()));
-        let mut next = || words.next().ok_or_else(|| format("the file is cut short"));
-        for tile in &mut film.tiles {
-            for (sum, square) in tile.sums.iter_mut().zip(&mut tile.squares) {
-                for v in sum.iter_mut().chain(square) {
-                    *v = f64::from_bits(next()?);
-                }
-            }
-            tile.non_finite = next()?;
-        }
-        if let Some(tile) = film.tiles.first_mut() {
-            tile.places = found.non_finite_at;
-        }
-        let state = words.flat_map(u64::to_le_bytes).collect();
-        Ok((film, state))
+/// Checks version and checksum and decodes the rest.
+fn decode(data: &[u8]) -> Result<Contents, String> {
+    let version = version(data).ok_or("not a lightsieve checkpoint")?;
+    if version != VERSION.to_string() {
+        return Err(format!(
+            "the checkpoint has version {version} of the format; this program reads version {VERSION}"
+        ));
+    }
+    let damaged = || "the checkpoint is damaged or cut short: its checksum does not match".to_owned();
+    let (checked, checksum) = data.split_last_chunk::<CHECKSUM>().ok_or_else(damaged)?;
+    if crc32fast::hash(checked) != u32::from_le_bytes(*checksum) {
+        return Err(damaged());
+    }
+    let line = checked.iter().position(|&b| b == b'\n').ok_or_else(damaged)?;
+    postcard::from_bytes(&checked[line + 1..]).map_err(|e| format!("the checkpoint is damaged: {e}"))
+}
+
+/// The version that the beginning of a file tells; none if it is no checkpoint.
+fn version(data: &[u8]) -> Option<String> {
+    let head = String::from_utf8_lossy(&data[..data.len().min(HEAD)]);
+    let (_, rest) = head.split_once(NAME)?;
+    let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
+    (!digits.is_empty()).then_some(digits)
+}
+
+/// Passes bytes on to a file and sums them up.
+struct Checksummed<'a> {
+    file: &'a mut dyn Write,
+    checksum: crc32fast::Hasher,
+}
+
+impl Write for Checksummed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.checksum.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
     }
 }

@@ -1,4 +1,5 @@
-//! One number for everything in a prepared scene that the picture depends on, so that a checkpoint of another scene is recognised.
+//! One number for everything in a prepared scene that the picture depends on, so that a checkpoint of another scene
+//! is recognised.
 
 use crate::emit::Light;
 use crate::math::Rgb;
@@ -43,7 +44,7 @@ pub fn scene_hash(scene: &PreparedScene) -> u64 {
             other => h.debug(other),
         }
     }
-    // These have no canonical bytes; their debug form changes when they do.
+    // Materials, camera and filter have no canonical bytes; their debug form changes when they do.
     h.debug(&scene.materials);
     h.debug(&scene.camera);
     h.debug(&scene.filter);

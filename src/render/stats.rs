@@ -1,8 +1,7 @@
 //! Statistics of a render, as JSON with fixed keys.
 
-use super::Outcome;
-use crate::film::{Film, NonFinite};
-use crate::prepared::PreparedScene;
+use super::{Plan, PreparedJob, Rendered};
+use crate::film::NonFinite;
 use crate::ray::RayKind;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -31,7 +30,8 @@ impl Clock {
 
 /// Processor seconds of this process so far, all threads, where the system tells (Linux).
 pub fn cpu_seconds() -> Option<f64> {
-    // Fields 14 and 15 of /proc/self/stat, user and system time in clock ticks; the name in parentheses may hold blanks.
+    // Fields 14 and 15 of /proc/self/stat, user and system time in clock ticks; the name in parentheses may hold
+    // blanks.
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     let mut fields = stat.rsplit_once(')')?.1.split_whitespace();
     let user: f64 = fields.nth(11)?.parse().ok()?;
@@ -52,11 +52,11 @@ pub fn peak_rss_bytes() -> Option<u64> {
 pub struct ErrorEstimate {
     /// Measure.
     pub measure: &'static str,
-    /// What was asked for.
+    /// The error to get below.
     pub target: f64,
-    /// What it is by estimate; none if there were too few iterations.
+    /// The estimated error; none if there were too few iterations.
     pub estimate: Option<f64>,
-    /// The two seeds that the estimate compares.
+    /// Seeds of the two halves that the estimate compares.
     pub seeds: [u64; 2],
 }
 
@@ -80,29 +80,30 @@ pub struct RenderStats {
     pub iterations: u64,
     /// Wall seconds of the iterations of this run.
     pub wall_s: f64,
-    /// Processor seconds of the same, all threads.
+    /// Processor seconds of these iterations, all threads.
     pub cpu_s: Option<f64>,
     /// Wall seconds by phase.
     pub phases: BTreeMap<&'static str, f64>,
     /// Rays by kind.
     pub rays: BTreeMap<&'static str, u64>,
-    /// Of shadow rays, how many were blocked, by kind.
+    /// Blocked shadow rays by kind.
     pub blocked: BTreeMap<&'static str, u64>,
     /// Nanoseconds of one thread per ray, by kind (sampled clock).
     pub ns_per_ray: BTreeMap<&'static str, f64>,
     /// Rays per wall second.
     pub rays_per_s: f64,
-    /// Share of the render's wall time (all threads) inside ray queries, 0 … 1, each as long as it takes by itself (see `ray::tracer`).
+    /// Share of the render's wall time (all threads) inside ray queries, 0 … 1, each as long as it takes by itself
+    /// (see `ray::tracer`).
     pub ray_query_share: f64,
     /// Largest resident memory.
     pub peak_rss_bytes: Option<u64>,
     /// Samples that were not finite and were left out.
     pub non_finite: u64,
-    /// Where the first of them were.
+    /// Pixels and sources of the first of them.
     pub non_finite_at: Vec<NonFinite>,
     /// Rays with a component that was not finite; not traced.
     pub invalid_rays: u64,
-    /// The error that the render was to get below, and what it is by estimate.
+    /// Error target and estimated error, if there is a target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorEstimate>,
     /// Seed.
@@ -111,7 +112,7 @@ pub struct RenderStats {
     pub threads: usize,
     /// Ray-query backend and its version.
     pub backend: String,
-    /// What the integrator decided by itself.
+    /// Decisions of the integrator, for people to read.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
     /// Integrator.
@@ -122,17 +123,24 @@ pub struct RenderStats {
     pub scene: SceneStats,
 }
 
+impl SceneStats {
+    fn new(prepared: &PreparedJob) -> SceneStats {
+        let scene = &prepared.scene;
+        SceneStats {
+            triangles: scene.geometry.triangle_count(),
+            emitters: scene.lights.len(),
+            textures: prepared.history.textures,
+            features: scene.features.names(),
+        }
+    }
+}
+
 impl RenderStats {
-    /// Puts the numbers together. `phases` holds what happened around the render itself (loading, preparing).
-    pub fn new(
-        scene: &PreparedScene,
-        film: &Film,
-        outcome: &Outcome,
-        mut phases: BTreeMap<&'static str, f64>,
-        textures: usize,
-        run: (u64, usize, &'static str),
-    ) -> RenderStats {
-        let (seed, threads, integrator) = run;
+    /// Statistics of a render on the threads of the current pool.
+    pub fn new(prepared: &PreparedJob, plan: &Plan, rendered: &Rendered) -> RenderStats {
+        let (scene, film, outcome) = (&prepared.scene, &rendered.film, &rendered.outcome);
+        let threads = rayon::current_num_threads();
+        let mut phases = prepared.history.phases.clone();
         let wall = outcome.wall.as_secs_f64();
         phases.insert("render", wall);
         for (name, seconds) in outcome.rays.phases.iter() {
@@ -158,19 +166,14 @@ impl RenderStats {
             non_finite,
             non_finite_at,
             invalid_rays: outcome.rays.invalid,
-            error: None,
-            seed,
+            error: rendered.error,
+            seed: plan.seed,
             threads,
             backend: scene.query.describe(),
             notes: outcome.notes.clone(),
-            integrator,
+            integrator: plan.method.spec.name,
             version: env!("CARGO_PKG_VERSION"),
-            scene: SceneStats {
-                triangles: scene.geometry.triangle_count(),
-                emitters: scene.lights.len(),
-                textures,
-                features: scene.features.names(),
-            },
+            scene: SceneStats::new(prepared),
         }
     }
 }

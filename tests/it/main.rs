@@ -4,6 +4,7 @@
 mod agreement;
 mod architecture;
 mod bad_input;
+mod checkpoints;
 mod cli;
 mod cli_techniques;
 mod factors;

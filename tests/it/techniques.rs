@@ -5,14 +5,12 @@ use crate::support::gallery::{GALLERY, exhibit};
 use crate::support::pictures::{RENDERS, SIGNIFICANCE, chance, prepare};
 use lightsieve::film::Film;
 use lightsieve::film::pyramid::Side;
-use lightsieve::integrators::{Integrator, IntegratorSpec, Params, bdpt, importance, light, resampling};
+use lightsieve::integrators::{Integrator, IntegratorSpec, Iteration, Params, bdpt, importance, light, resampling};
 use lightsieve::math::Rgb;
 use lightsieve::prepared::{Features, PreparedScene};
 use lightsieve::ray::Backend;
-use lightsieve::render::{Budget, render};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
 
 fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Integrator> {
     let mut values = Params::defaults(spec);
@@ -28,8 +26,10 @@ fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Inte
 
 fn run(scene: &PreparedScene, integrator: &mut dyn Integrator, spp: u64, seed: u64) -> Film {
     let mut film = Film::new(scene.window);
-    let budget = Budget { iterations: Some(spp), time: None };
-    render(scene, integrator, &mut film, seed, budget, &AtomicBool::new(false), |_, _, _| {});
+    for _ in 0..spp {
+        let index = film.begin_iteration();
+        integrator.iterate(&Iteration { scene, seed, index }, &mut film);
+    }
     assert_eq!(film.non_finite(), (0, vec![]));
     film
 }

@@ -2,8 +2,9 @@
 
 use crate::image::error_image::scale_position;
 
-/// A colour in 32 bits: three mantissas of nine bits and a shared exponent of five (as `GL_RGB9_E5`; largest value 65408, steps of
-/// at most 1/256 of the largest channel). Negative values become zero, and pixels that are not finite the brightest magenta.
+/// A colour in 32 bits: three mantissas of nine bits and a shared exponent of five (as `GL_RGB9_E5`; largest value
+/// 65408, steps of at most 1/256 of the largest channel). Negative values become zero, and pixels that are not finite
+/// the brightest magenta.
 pub fn shared_exponent(pixel: [f64; 3]) -> u32 {
     const BIAS: i32 = 15;
     const MANTISSA: i32 = 9;

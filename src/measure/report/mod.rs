@@ -1,4 +1,5 @@
-//! One HTML file that holds everything and opens without a network: tables, plots, and pictures in floats to flip between.
+//! One HTML file that holds everything and opens without a network: tables, plots, and pictures in floats to flip
+//! between.
 
 pub mod encode;
 pub mod html;

@@ -15,7 +15,7 @@ pub struct Line {
 /// A plot.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// What it shows.
+    /// Title.
     pub title: String,
     /// Name of the axes.
     pub axes: [String; 2],
@@ -27,12 +27,21 @@ pub struct Plot {
 
 /// Okabe & Ito's colours, which most colour-blind people can tell apart.
 const COLOURS: [&str; 8] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c6d31"];
-/// Where they begin anew, lines are broken in another way.
+/// Dashes of the curves: where the colours begin anew, the next pattern is taken.
 const DASHES: [&str; 3] = ["none", "7 4", "2 3"];
 
-/// Colour and dashes of line `i`.
-fn stroke(i: usize) -> (&'static str, &'static str) {
-    (COLOURS[i % COLOURS.len()], DASHES[i / COLOURS.len() % DASHES.len()])
+/// Colour and dashes of a curve.
+#[derive(Clone, Copy)]
+struct Stroke {
+    colour: &'static str,
+    dashes: &'static str,
+}
+
+impl Stroke {
+    /// The stroke of curve `i`.
+    fn of(i: usize) -> Stroke {
+        Stroke { colour: COLOURS[i % COLOURS.len()], dashes: DASHES[i / COLOURS.len() % DASHES.len()] }
+    }
 }
 
 const SIZE: [f64; 2] = [560.0, 380.0];
@@ -87,48 +96,87 @@ fn label(value: f64) -> String {
     }
 }
 
+/// The rectangle of the curves in the picture, with its axes.
+struct Frame {
+    left: f64,
+    right: f64,
+    top: f64,
+    base: f64,
+    x: Axis,
+    y: Axis,
+}
+
 impl Plot {
     /// The picture; a sentence where there is nothing to show.
     pub fn svg(&self) -> String {
-        let all = || self.lines.iter().flat_map(|l| &l.points);
         let [width, bottom] = SIZE;
-        let (left, right) = (MARGIN[0], width - MARGIN[2]);
-        let (top, base) = (MARGIN[1], bottom - MARGIN[3]);
-        let heights = all().flat_map(|p| p[1..].iter().copied());
-        let (Some(x), Some(y)) = (Axis::new(all().map(|p| p[0]), left, right), Axis::new(heights, base, top)) else {
+        let Some(frame) = self.frame() else {
             return format!("<p>{}: nothing to plot</p>", escape(&self.title));
         };
         let height = bottom + LEGEND_LINE * (self.lines.len() + 1) as f64;
         let mut out = format!(
-            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\
-             <text class=\"title\" x=\"{left}\" y=\"18\">{0}</text>",
-            escape(&self.title)
+            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" \
+             aria-label=\"{0}\"><text class=\"title\" x=\"{1}\" y=\"18\">{0}</text>",
+            escape(&self.title),
+            frame.left,
         );
-        for (value, named) in x.ticks() {
-            let at = x.at(value);
+        frame.grid(&mut out);
+        frame.outline(&mut out, &self.axes);
+        for (i, line) in self.lines.iter().enumerate() {
+            let stroke = Stroke::of(i);
+            frame.curve(&mut out, line, stroke);
+            let Stroke { colour, dashes } = stroke;
+            let style = format!("stroke=\"{colour}\" stroke-dasharray=\"{dashes}\" stroke-width=\"2.5\"");
+            frame.legend(&mut out, i, &style, &line.name);
+        }
+        if let Some((name, level)) = &self.floor {
+            frame.legend(&mut out, self.lines.len(), "class=\"floor\"", &format!("{name}: {level:.2e}"));
+            if level.log10() >= frame.y.lo {
+                let Frame { left, right, .. } = frame;
+                let _ = write!(out, "<path class=\"floor\" d=\"M{left} {0:.1}H{right}\"/>", frame.y.at(*level));
+            }
+        }
+        out.push_str("</svg>");
+        out
+    }
+
+    /// The frame for all points; none if no point can be shown.
+    fn frame(&self) -> Option<Frame> {
+        let all = || self.lines.iter().flat_map(|l| &l.points);
+        let [width, bottom] = SIZE;
+        let (left, right) = (MARGIN[0], width - MARGIN[2]);
+        let (top, base) = (MARGIN[1], bottom - MARGIN[3]);
+        let x = Axis::new(all().map(|p| p[0]), left, right)?;
+        let y = Axis::new(all().flat_map(|p| p[1..].iter().copied()), base, top)?;
+        Some(Frame { left, right, top, base, x, y })
+    }
+}
+
+impl Frame {
+    /// Lines and labels of both axes.
+    fn grid(&self, out: &mut String) {
+        let Frame { left, right, top, base, .. } = self;
+        for (value, named) in self.x.ticks() {
+            let at = self.x.at(value);
             let _ = write!(out, "<path class=\"grid\" d=\"M{at:.1} {top}V{base}\"/>");
             if named {
-                let _ = write!(
-                    out,
-                    "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
-                    base + 15.0,
-                    label(value)
-                );
+                let (below, label) = (base + 15.0, label(value));
+                let _ = write!(out, "<text x=\"{at:.1}\" y=\"{below}\" text-anchor=\"middle\">{label}</text>");
             }
         }
-        for (value, named) in y.ticks() {
-            let at = y.at(value);
+        for (value, named) in self.y.ticks() {
+            let at = self.y.at(value);
             let _ = write!(out, "<path class=\"grid\" d=\"M{left} {at:.1}H{right}\"/>");
             if named {
-                let _ = write!(
-                    out,
-                    "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-                    left - 5.0,
-                    at + 4.0,
-                    label(value)
-                );
+                let (beside, line, label) = (left - 5.0, at + 4.0, label(value));
+                let _ = write!(out, "<text x=\"{beside}\" y=\"{line:.1}\" text-anchor=\"end\">{label}</text>");
             }
         }
+    }
+
+    /// The outline with the names of the axes.
+    fn outline(&self, out: &mut String, axes: &[String; 2]) {
+        let Frame { left, right, top, base, .. } = self;
         let _ = write!(
             out,
             "<path class=\"frame\" d=\"M{left} {top}H{right}V{base}H{left}Z\"/>\
@@ -136,70 +184,57 @@ impl Plot {
              <text transform=\"translate(14 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
             0.5 * (left + right),
             base + 32.0,
-            escape(&self.axes[0]),
+            escape(&axes[0]),
             0.5 * (top + base),
-            escape(&self.axes[1]),
+            escape(&axes[1]),
         );
-        for (i, line) in self.lines.iter().enumerate() {
-            let (colour, dashes) = stroke(i);
-            curve(&mut out, line, (colour, dashes), &x, &y);
-            let at = bottom + LEGEND_LINE * i as f64;
-            let _ = write!(
-                out,
-                "<path d=\"M{left} {:.1}h22\" stroke=\"{colour}\" stroke-dasharray=\"{dashes}\" stroke-width=\"2.5\"/><text x=\"{}\" y=\"{:.1}\">{}</text>",
-                at - 4.0,
-                left + 28.0,
-                at,
-                escape(&line.name)
-            );
-        }
-        if let Some((name, level)) = &self.floor {
-            let at = bottom + LEGEND_LINE * self.lines.len() as f64;
-            let _ = write!(
-                out,
-                "<path class=\"floor\" d=\"M{left} {0:.1}h22\"/><text x=\"{1}\" y=\"{2:.1}\">{3}: {level:.2e}</text>",
-                at - 4.0,
-                left + 28.0,
-                at,
-                escape(name)
-            );
-            if level.log10() >= y.lo {
-                let _ = write!(out, "<path class=\"floor\" d=\"M{left} {0:.1}H{right}\"/>", y.at(*level));
-            }
-        }
-        out.push_str("</svg>");
-        out
     }
-}
 
-fn curve(out: &mut String, line: &Line, (colour, dashes): (&str, &str), x: &Axis, y: &Axis) {
-    let place = |p: &[f64; 4], v: usize| format!("{:.1} {:.1}", x.at(p[0]), y.at(p[v]));
-    let points: Vec<&[f64; 4]> = line.points.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
-    if points.is_empty() {
-        return;
-    }
-    let upper: Vec<String> = points.iter().map(|p| place(p, 3)).collect();
-    let lower: Vec<String> = points.iter().rev().map(|p| place(p, 2)).collect();
-    let middle: Vec<String> = points.iter().map(|p| place(p, 1)).collect();
-    let _ = write!(
-        out,
-        "<path d=\"M{}L{}Z\" fill=\"{colour}\" fill-opacity=\"0.15\"/>\
-         <path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-dasharray=\"{dashes}\" stroke-width=\"2\"/>",
-        upper.join("L"),
-        lower.join("L"),
-        middle.join("L")
-    );
-    for p in points {
+    /// Line `i` of the legend; `style` holds the attributes of its stroke.
+    fn legend(&self, out: &mut String, i: usize, style: &str, name: &str) {
+        let at = SIZE[1] + LEGEND_LINE * i as f64;
         let _ = write!(
             out,
-            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.8\" fill=\"{colour}\"><title>{}: {:.3} s, {:.4e} ({:.3e} to {:.3e})</title></circle>",
-            x.at(p[0]),
-            y.at(p[1]),
-            escape(&line.name),
-            p[0],
-            p[1],
-            p[2],
-            p[3]
+            "<path {style} d=\"M{} {:.1}h22\"/><text x=\"{}\" y=\"{at:.1}\">{}</text>",
+            self.left,
+            at - 4.0,
+            self.left + 28.0,
+            escape(name)
         );
+    }
+
+    /// A curve with the band between its smallest and largest values.
+    fn curve(&self, out: &mut String, line: &Line, stroke: Stroke) {
+        let (Frame { x, y, .. }, Stroke { colour, dashes }) = (self, stroke);
+        let place = |p: &[f64; 4], v: usize| format!("{:.1} {:.1}", x.at(p[0]), y.at(p[v]));
+        let points: Vec<&[f64; 4]> = line.points.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+        if points.is_empty() {
+            return;
+        }
+        let upper: Vec<String> = points.iter().map(|p| place(p, 3)).collect();
+        let lower: Vec<String> = points.iter().rev().map(|p| place(p, 2)).collect();
+        let middle: Vec<String> = points.iter().map(|p| place(p, 1)).collect();
+        let _ = write!(
+            out,
+            "<path d=\"M{}L{}Z\" fill=\"{colour}\" fill-opacity=\"0.15\"/>\
+             <path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-dasharray=\"{dashes}\" stroke-width=\"2\"/>",
+            upper.join("L"),
+            lower.join("L"),
+            middle.join("L")
+        );
+        for p in points {
+            let _ = write!(
+                out,
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.8\" fill=\"{colour}\"><title>{}: {:.3} s, {:.4e} ({:.3e} to \
+                 {:.3e})</title></circle>",
+                x.at(p[0]),
+                y.at(p[1]),
+                escape(&line.name),
+                p[0],
+                p[1],
+                p[2],
+                p[3]
+            );
+        }
     }
 }

@@ -5,16 +5,14 @@
 //! compared by Welch's t-test, in every pixel and channel with Šidák's correction for their number, and in the mean of the
 //! whole picture, which is far more sensitive to a bias that is everywhere. Seeds are fixed: a test that passes passes always.
 
-use lightsieve::film::Film;
 use lightsieve::integrators::{IntegratorSpec, Params};
 use lightsieve::load::{LoadOptions, load_scene};
 use lightsieve::prepared::{PrepareOptions, PreparedScene};
 use lightsieve::ray::Backend;
-use lightsieve::render::{Budget, render};
+use lightsieve::render::Estimator;
 use lightsieve::scene::{Diagnostics, SceneDesc};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
-use std::sync::atomic::AtomicBool;
 
 /// Chance that one comparison of two equal expectations fails (with other seeds than these).
 pub const SIGNIFICANCE: f64 = 1e-3;
@@ -86,17 +84,13 @@ impl Picture {
         let renders: Vec<Vec<[f64; 3]>> = (seed..seed + RENDERS)
             .into_par_iter()
             .map(|seed| {
-                let mut film = Film::new(scene.window);
-                let budget = Budget { iterations: Some(spp), time: None };
-                let never = AtomicBool::new(false);
-                let outcome = render(scene, &mut *(spec.build)(&values), &mut film, seed, budget, &never, |_, _, _| {});
-                assert_eq!(film.non_finite(), (0, vec![]), "{}", spec.name);
-                assert_eq!(outcome.rays.invalid, 0, "{}", spec.name);
-                let mut mean = vec![[0.0; 3]; (film.width * film.height) as usize];
-                film.for_each_pixel(|x, y, sum, _| {
-                    mean[(y * film.width + x) as usize] = sum.map(|s| s / spp as f64);
-                });
-                mean
+                let mut estimator = Estimator::new((spec.build)(&values), scene.window, seed);
+                for _ in 0..spp {
+                    estimator.iterate(scene);
+                }
+                assert_eq!(estimator.film.non_finite(), (0, vec![]), "{}", spec.name);
+                assert_eq!(estimator.rays().invalid, 0, "{}", spec.name);
+                estimator.film.mean_f64()
             })
             .collect();
         let pixels = renders[0].len();

@@ -1,0 +1,144 @@
+//! The run step: estimators are made or restored, iterate, are saved, and become one picture.
+
+use super::error_target::{UntilError, half_seeds};
+use super::iterations::{Outcome, Schedule, run_iterations};
+use super::schedule::{Alternate, total_iterations};
+use super::stats::ErrorEstimate;
+use super::{CheckpointError, Estimator, JobError, Plan, RenderIdentity, Runtime};
+use crate::film::{Film, Pyramid};
+use crate::integrators::Integrator;
+use crate::prepared::PreparedScene;
+use std::borrow::Cow;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Wall time between checkpoints.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
+
+/// Result of a run.
+pub struct Rendered {
+    /// All iterations.
+    pub film: Film,
+    /// The integrators after their last iteration; each keeps a pyramid, if one was asked for.
+    integrators: Vec<Box<dyn Integrator>>,
+    /// Time, rays, reason for the end.
+    pub outcome: Outcome,
+    /// Estimated error, if the plan has an error target.
+    pub error: Option<ErrorEstimate>,
+    /// Failure of the last checkpoint.
+    pub checkpoint_error: Option<CheckpointError>,
+}
+
+impl Rendered {
+    /// Pictures of every technique over all iterations, if they were asked for.
+    pub fn pyramid(&self) -> Option<Cow<'_, Pyramid>> {
+        let mut pyramids = self.integrators.iter().filter_map(|i| i.pyramid());
+        let mut sum = Cow::Borrowed(pyramids.next()?);
+        pyramids.for_each(|other| sum.to_mut().merge(other));
+        Some(sum)
+    }
+}
+
+/// Runs a plan: one estimator, or two halves if there is an error target.
+///
+/// # Errors
+/// If a checkpoint cannot be resumed, or the run was interrupted before its first iteration: an earlier picture is
+/// worth more than a black one.
+pub fn run(scene: &PreparedScene, plan: &Plan, runtime: Runtime) -> Result<Rendered, JobError> {
+    runtime.pool.install(|| {
+        let mut checkpoints = Checkpoints::new(scene, plan);
+        let mut estimators = estimators(scene, plan, &checkpoints)?;
+        let mut turns = Alternate { budget: plan.budget };
+        let mut until_error =
+            plan.error_target.map(|target| UntilError::new(target, plan.budget, total_iterations(&estimators)));
+        let schedule: &mut dyn Schedule = match &mut until_error {
+            Some(until_error) => until_error,
+            None => &mut turns,
+        };
+
+        runtime.observer.run_begins();
+        let outcome =
+            run_iterations(scene, &mut estimators, schedule, runtime.interrupt, &mut |progress, estimators| {
+                runtime.observer.progress(progress);
+                checkpoints.save_if_due(estimators);
+            });
+        runtime.observer.run_ends();
+        if total_iterations(&estimators) == 0 {
+            return Err(JobError::Interrupted);
+        }
+        let checkpoint_error = checkpoints.save(&estimators).err();
+        let error = plan.error_target.zip(until_error).map(|(target, until)| ErrorEstimate {
+            measure: target.key,
+            target: target.value,
+            estimate: until.final_estimate(&estimators),
+            seeds: half_seeds(plan.seed),
+        });
+        let mut film = Film::new(scene.window);
+        estimators.iter().for_each(|e| film.add(&e.film));
+        let integrators = estimators.into_iter().map(|e| e.integrator).collect();
+        Ok(Rendered { film, integrators, outcome, error, checkpoint_error })
+    })
+}
+
+/// The plan's estimators, empty or from a checkpoint.
+fn estimators(scene: &PreparedScene, plan: &Plan, checkpoints: &Checkpoints) -> Result<Vec<Estimator>, JobError> {
+    let seeds = if plan.error_target.is_some() { half_seeds(plan.seed).to_vec() } else { vec![plan.seed] };
+    let mut estimators: Vec<Estimator> =
+        seeds.into_iter().map(|seed| Estimator::new(plan.method.build(), scene.window, seed)).collect();
+    if let (Some(path), Some(identity)) = (&plan.resume, &checkpoints.identity) {
+        for (estimator, saved) in estimators.iter_mut().zip(identity.load(path)?) {
+            if !estimator.restore(scene, saved.film, &saved.state) {
+                let reason = "the checkpoint does not hold what this integrator has learnt";
+                return Err(JobError::Input(format!("{}: {reason}", path.display())));
+            }
+        }
+    }
+    if let Some(max_edges) = plan.pyramid_edges {
+        for estimator in &mut estimators {
+            if !estimator.integrator.keep_pyramid(scene.window, max_edges) {
+                return Err(JobError::Input(format!(
+                    "{} has no techniques to tell apart; --pyramid needs a bidirectional integrator",
+                    plan.method.spec.name
+                )));
+            }
+        }
+    }
+    Ok(estimators)
+}
+
+/// Checkpoints of a run.
+struct Checkpoints<'a> {
+    /// File to save them to.
+    path: Option<&'a Path>,
+    /// Identity of the render, if checkpoints are saved or resumed.
+    identity: Option<RenderIdentity>,
+    last: Instant,
+}
+
+impl Checkpoints<'_> {
+    fn new<'a>(scene: &PreparedScene, plan: &'a Plan) -> Checkpoints<'a> {
+        let wanted = plan.checkpoint.is_some() || plan.resume.is_some();
+        Checkpoints {
+            path: plan.checkpoint.as_deref(),
+            identity: wanted.then(|| RenderIdentity::new(scene, plan)),
+            last: Instant::now(),
+        }
+    }
+
+    /// Saves if the last checkpoint is old enough. A failure is reported by the last one alone: until then the disk
+    /// may have room again.
+    fn save_if_due(&mut self, estimators: &[Estimator]) {
+        if self.last.elapsed() > CHECKPOINT_INTERVAL {
+            let _ = self.save(estimators);
+            self.last = Instant::now();
+        }
+    }
+
+    /// Saves, if checkpoints are asked for.
+    fn save(&self, estimators: &[Estimator]) -> Result<(), CheckpointError> {
+        match (self.path, &self.identity) {
+            (Some(path), Some(identity)) => identity.save(path, estimators),
+            _ => Ok(()),
+        }
+    }
+}
