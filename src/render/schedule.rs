@@ -101,3 +101,23 @@ impl Schedule for EqualTime {
         estimators.iter().map(used).sum::<f64>() / estimators.len().max(1) as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_iteration_that_would_overshoot_is_not_started() {
+        let seconds = Duration::from_secs;
+        let budget = Budget { iterations: None, time: Some(seconds(10)) };
+        // The first iteration of a run always starts, however many an earlier run has made.
+        assert!(!budget.used_up(1000, 0, seconds(0)));
+        assert!(!budget.used_up(4, 4, seconds(8)));
+        assert!(budget.used_up(4, 4, seconds(9)));
+        assert_eq!(budget.used(4, seconds(4)), 0.4);
+        let both = Budget { iterations: Some(4), ..budget };
+        assert!(both.used_up(4, 4, seconds(1)) && both.used_up(4, 0, seconds(0)) && !both.used_up(3, 3, seconds(1)));
+        assert_eq!((both.used(2, seconds(1)), both.used(4, seconds(20))), (0.5, 1.0));
+        assert!(!Budget::default().used_up(u64::MAX, u64::MAX, seconds(1)));
+    }
+}
