@@ -205,7 +205,7 @@ pub(crate) struct CheckRaysArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct CompareArgs {
-    /// Image to judge
+    /// Image to compare with the reference
     pub image: PathBuf,
     /// Reference
     pub reference: PathBuf,

@@ -20,7 +20,7 @@ pub struct Splat {
     pub vertex: u32,
     /// Number of the contribution in a replay.
     pub note: u32,
-    /// What it brings.
+    /// Contribution to the pixel.
     pub value: Rgb,
 }
 

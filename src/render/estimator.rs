@@ -7,7 +7,7 @@ use crate::prepared::PreparedScene;
 use crate::ray::RayStats;
 use std::time::Duration;
 
-/// An integrator with its film and its seed. The film knows the index of the next iteration.
+/// An integrator with its film and its seed. The film counts the iterations.
 pub struct Estimator {
     /// Integrator.
     pub integrator: Box<dyn Integrator>,

@@ -48,7 +48,7 @@ pub struct PreparedJob {
     pub file: PathBuf,
     /// Prepared scene.
     pub scene: PreparedScene,
-    /// Diagnostics of the preparation apart, everything that statistics tell of the way here.
+    /// Facts about loading and preparing.
     pub(super) history: History,
 }
 

@@ -19,7 +19,7 @@ const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 pub struct Rendered {
     /// All iterations.
     pub film: Film,
-    /// The integrators after their last iteration; each keeps a pyramid, if one was asked for.
+    /// The integrators after their last iteration; each keeps a pyramid, if the plan has one.
     integrators: Vec<Box<dyn Integrator>>,
     /// Time, rays, reason for the end.
     pub outcome: Outcome,
@@ -30,7 +30,7 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// Pictures of every technique over all iterations, if they were asked for.
+    /// Pictures of every technique over all iterations, if the plan has them.
     pub fn pyramid(&self) -> Option<Cow<'_, Pyramid>> {
         let mut pyramids = self.integrators.iter().filter_map(|i| i.pyramid());
         let mut sum = Cow::Borrowed(pyramids.next()?);
@@ -134,7 +134,7 @@ impl Checkpoints<'_> {
         }
     }
 
-    /// Saves, if checkpoints are asked for.
+    /// Saves, if the plan has checkpoints.
     fn save(&self, estimators: &[Estimator]) -> Result<(), CheckpointError> {
         match (self.path, &self.identity) {
             (Some(path), Some(identity)) => identity.save(path, estimators),
