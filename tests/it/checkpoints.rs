@@ -1,7 +1,6 @@
 //! Checkpoints from outside: renders with an error target go on bit by bit, and damaged files are refused.
 
 use crate::support::program::Sandbox;
-
 use lightsieve::image::{Encoding, read_image};
 use serde_json::Value;
 
