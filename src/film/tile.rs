@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn the_source_of_a_non_finite_sample_is_told() {
         let nan = Rgb::new(f32::NAN, 0.0, 0.0);
-        let max = Rgb::grey(f32::MAX);
+        let large = Rgb::new(0.6 * f32::MAX, 0.0, 0.0);
         let source = |contributions: &[(Part, Rgb)], splat: Rgb| {
             let window = [0, 0, 3, 2];
             let (mut film, mut buffer) = (Film::new(window), SampleBuffer::default());
@@ -187,6 +187,6 @@ mod tests {
         );
         assert_eq!(source(&[(Part::Connection, nan)], Rgb::WHITE), at(NonFiniteSource::Connection));
         assert_eq!(source(&[], nan), at(NonFiniteSource::LightImage));
-        assert_eq!(source(&[(Part::AtOnce, max), (Part::Direct, max)], Rgb::BLACK), at(NonFiniteSource::Sum));
+        assert_eq!(source(&[(Part::AtOnce, large), (Part::Direct, large)], Rgb::BLACK), at(NonFiniteSource::Sum));
     }
 }

@@ -141,14 +141,8 @@ impl RenderIdentity {
     pub fn save(&self, path: &Path, estimators: &[Estimator]) -> Result<(), CheckpointError> {
         let estimators = estimators.iter().map(|e| EstimatorRef { film: &e.film, state: e.integrator.state() });
         let contents = ContentsRef { identity: self, estimators: estimators.collect() };
-        atomic_write(path, |file| {
-            let mut out = BufWriter::new(Checksummed { file, checksum: crc32fast::Hasher::new() });
-            writeln!(out, "{NAME}{VERSION}")?;
-            postcard::to_io(&contents, &mut out).map_err(std::io::Error::other)?;
-            let Checksummed { file, checksum } = out.into_inner().map_err(|e| e.into_error())?;
-            file.write_all(&checksum.finalize().to_le_bytes())
-        })
-        .map_err(|source| CheckpointError::Io { path: path.to_owned(), source })
+        atomic_write(path, |file| encode(&contents, file))
+            .map_err(|source| CheckpointError::Io { path: path.to_owned(), source })
     }
 
     /// Reads the estimators back, if the checkpoint is of this render.
@@ -168,6 +162,18 @@ impl RenderIdentity {
         }
         Ok(found.estimators)
     }
+}
+
+/// Writes version, contents and checksum.
+fn encode(contents: &ContentsRef, file: &mut dyn Write) -> std::io::Result<()> {
+    let mut out = BufWriter::new(Checksummed { file, checksum: crc32fast::Hasher::new(), error: None });
+    writeln!(out, "{NAME}{VERSION}")?;
+    if let Err(e) = postcard::to_io(contents, &mut out) {
+        // Of a failed write postcard says only that it failed.
+        return Err(out.get_mut().error.take().unwrap_or_else(|| std::io::Error::other(e)));
+    }
+    let Checksummed { file, checksum, .. } = out.into_inner().map_err(|e| e.into_error())?;
+    file.write_all(&checksum.finalize().to_le_bytes())
 }
 
 /// Checks version and checksum and decodes the rest.
@@ -199,16 +205,27 @@ fn version(data: &[u8]) -> Option<String> {
 struct Checksummed<'a> {
     file: &'a mut dyn Write,
     checksum: crc32fast::Hasher,
+    /// The latest failure of the file.
+    error: Option<std::io::Error>,
+}
+
+impl Checksummed<'_> {
+    /// Keeps a failure, of which the caller gets the kind alone.
+    fn keep(&mut self, e: std::io::Error) -> std::io::Error {
+        let kind = e.kind();
+        self.error = Some(e);
+        kind.into()
+    }
 }
 
 impl Write for Checksummed<'_> {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let written = self.file.write(bytes)?;
+        let written = self.file.write(bytes).map_err(|e| self.keep(e))?;
         self.checksum.update(&bytes[..written]);
         Ok(written)
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        self.file.flush()
+        self.file.flush().map_err(|e| self.keep(e))
     }
 }
