@@ -359,10 +359,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         if allocation.is_none() && strategy.is_empty() {
             return vec![];
         }
-        let mut state = postcard::to_allocvec(&SavedState { allocation, strategy }).unwrap_or_default();
-        // Checkpoints hold words of eight bytes.
-        state.resize(state.len().next_multiple_of(8), 0);
-        state
+        postcard::to_allocvec(&SavedState { allocation, strategy }).unwrap_or_default()
     }
 
     /// Goes on from a saved state of the same scene, seed and settings; false if it is of something else.
