@@ -97,7 +97,7 @@ impl Params {
             return Err(ParamError::Unknown {
                 integrator: self.integrator,
                 name: name.into(),
-                nearest: nearest(name, self.specs.iter().map(|p| p.name)),
+                nearest: self.nearest(name),
             });
         };
         let spec = self.specs[i];
@@ -116,6 +116,13 @@ impl Params {
             name: spec.name,
             value: self.values[i].to_string(),
         }))
+    }
+
+    /// The present name of the parameter one of whose names is nearest to `name`.
+    fn nearest(&self, name: &str) -> Option<&'static str> {
+        let names = |p: &'static ParamSpec| std::iter::once(p.name).chain(p.aliases.iter().map(|a| a.name));
+        let near = nearest(name, self.specs.iter().copied().flat_map(names))?;
+        self.position(near).map(|i| self.specs[i].name)
     }
 
     fn position(&self, name: &str) -> Option<usize> {

@@ -35,6 +35,8 @@ fn slips_are_explained() {
     let value = params.set("max_depth", "many").unwrap_err();
     assert!(value.to_string().contains("expected whole number"), "{value}");
     let mut params = Params::defaults(find("two-stage").unwrap());
+    let american = params.set("neighbors", "3").unwrap_err().to_string();
+    assert!(american.contains("did you mean \"nearest_caches\""), "{american}");
     for bad in ["0.001", "101%", "3/0", "0/0", "nan", "inf", "-0.4", "", "half"] {
         assert!(params.set("rr_scale", bad).is_err(), "{bad}");
     }
@@ -122,13 +124,13 @@ fn people_are_told_the_present_name() {
 #[test]
 fn defaults_have_the_bits_of_whole_numbers_of_parts() {
     let params = Params::defaults(find("ris").unwrap());
-    assert_eq!((params.float("rr_scale") * 100.0) as f32 * 0.01, 40i64 as f32 * 0.01);
-    assert_eq!(params.float("min_density_ratio") as f32, 1000i64 as f32 * 1e-6);
-    assert_eq!(params.float("min_unseen_fraction") as f32, 20_000i64 as f32 * 1e-6);
-    assert_eq!(params.float("cache_density"), 400i64 as f64 * 1e-5);
-    assert_eq!(Params::defaults(find("two-stage").unwrap()).float("cache_density"), 2000i64 as f64 * 1e-5);
-    assert_eq!(Params::defaults(find("ic-bdpt").unwrap()).float("record_density"), 100i64 as f64 * 1e-5);
-    assert_eq!(Params::defaults(find("skeleton").unwrap()).float("node_acceptance"), 20i64 as f64 * 0.01);
+    assert_eq!((params.float("rr_scale") * 100.0) as f32 * 0.01, 40.0_f32 * 0.01);
+    assert_eq!(params.float("min_density_ratio") as f32, 1000.0_f32 * 1e-6);
+    assert_eq!(params.float("min_unseen_fraction") as f32, 20_000.0_f32 * 1e-6);
+    assert_eq!(params.float("cache_density"), 400.0 * 1e-5);
+    assert_eq!(Params::defaults(find("two-stage").unwrap()).float("cache_density"), 2000.0 * 1e-5);
+    assert_eq!(Params::defaults(find("ic-bdpt").unwrap()).float("record_density"), 100.0 * 1e-5);
+    assert_eq!(Params::defaults(find("skeleton").unwrap()).float("node_acceptance"), 20.0 * 0.01);
 }
 
 /// Words that were private to this program, and those that texts for its users should do without.
