@@ -38,7 +38,7 @@ fn provenance() {
 mod embree {
     use std::path::{Path, PathBuf};
 
-    /// What to type when something is missing; printed with every error.
+    /// The command that installs missing packages; printed with every error.
     const INSTALL: &str = "apt-get install -y libembree-dev libclang-dev";
     const WITHOUT: &str =
         "or build without Embree (slower, pure Rust): cargo build --release --no-default-features --features cli";

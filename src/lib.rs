@@ -32,7 +32,7 @@
 //! let mut film = Film::new(scene.window);
 //! for _ in 0..4 {
 //!     let index = film.begin_iteration();
-//!     integrator.iterate(&integrators::Iteration { scene: &scene, seed: 0, index }, &mut film);
+//!     integrator.iterate(&integrators::Iteration::new(&scene, 0, index), &mut film);
 //! }
 //! // Linear Rec. 709 radiance, row by row from the top.
 //! let pixels = film.mean();

@@ -34,7 +34,7 @@ struct NamedMesh {
     textured: bool,
 }
 
-/// What the table in `scenes/README.md` says of a scene.
+/// A scene's row of the table in `scenes/README.md`.
 pub struct Row {
     pub name: &'static str,
     pub purpose: &'static str,
@@ -235,7 +235,7 @@ impl Scene {
         );
     }
 
-    /// The same radiance from everywhere.
+    /// Constant radiance from all directions.
     pub fn constant(&mut self, radiance: [f64; 3]) {
         self.infinite.push("constant sky");
         let radiance = rgb("radiance", radiance);

@@ -45,7 +45,7 @@ pub(crate) fn missing_instruction_sets() -> Vec<&'static str> {
     ])
 }
 
-/// Of instruction sets (name, needed, present) the names of those that are needed and not present.
+/// The names of the instruction sets (name, needed, present) that are needed and not present.
 #[cfg(target_arch = "x86_64")]
 fn missing(sets: &[(&'static str, bool, bool)]) -> Vec<&'static str> {
     sets.iter().filter(|(_, needed, present)| *needed && !present).map(|set| set.0).collect()

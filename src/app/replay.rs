@@ -21,7 +21,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     if x.wrapping_sub(x0) >= width || y.wrapping_sub(y0) >= height {
         return Err(Failure::Input(format!("pixel {x},{y} is not in the picture ({x0},{y0},{width},{height})")));
     }
-    let iteration = Iteration { scene, seed: args.sample.seed, index: args.iteration };
+    let iteration = Iteration::new(scene, args.sample.seed, args.iteration);
     let replay = environment.pool.install(|| method.build().replay(&iteration, (x, y)));
     out!("{} pixel {x},{y} iteration {} seed {}", method.spec.name, args.iteration, args.sample.seed);
     print(&replay, scene.centre);

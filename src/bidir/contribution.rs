@@ -1,20 +1,10 @@
 //! Contributions of bidirectional techniques on their way to the film.
 
+pub use crate::film::ContributionKind;
 use crate::film::Splat;
 use crate::math::Rgb;
 use crate::mis::MisWeight;
 use crate::path::Transmittance;
-
-/// The group of techniques that made a contribution to the pixel of an eye sub-path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ContributionKind {
-    /// s = 0: the eye sub-path met a light.
-    Hit,
-    /// s = 1.
-    NextEvent,
-    /// s ≥ 2.
-    Connection,
-}
 
 /// A contribution of the technique (s, t).
 #[derive(Clone, Copy, Debug, Default)]
@@ -54,6 +44,6 @@ impl Contribution {
     #[inline]
     pub fn splat(&self) -> Splat {
         let Contribution { x, y, path, replay_index, s, .. } = *self;
-        Splat { x, y, path, vertex: u32::from(s), note: replay_index, value: self.weighted() }
+        Splat { x, y, path, vertex: u32::from(s), replay_index, value: self.weighted() }
     }
 }

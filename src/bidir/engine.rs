@@ -19,7 +19,7 @@ use crate::ray::{Phases, RayStats, Tracer};
 use crate::shade::Transport;
 use rayon::prelude::*;
 
-/// What users decide about a bidirectional method.
+/// Settings of a bidirectional method.
 #[derive(Clone, Debug)]
 pub struct BidirSettings {
     /// Techniques that are used.
@@ -452,7 +452,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         let purpose = LightSubpathUse { number, splats: splats.then_some(queue), keep_vertices, replay: Some(replay) };
         self.light_rules(iteration).trace(&mut light_sampler(iteration, number), tracer, light, purpose);
         scratch.splats.flush(tracer);
-        scratch.splats.splats.drain(..).map(|splat| splat.note).collect()
+        scratch.splats.splats.drain(..).map(|splat| splat.replay_index).collect()
     }
 
     /// Writes down the vertices of the stored light sub-path `number`, and returns its origin.

@@ -261,7 +261,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         }
     }
 
-    /// What the factor of the edge from `vertex` to the vertex before depends on, for light that comes to `vertex` along `from`.
+    /// The argument of the factor of the edge from `vertex` to the vertex before, for light that comes to `vertex` along `from`.
     #[inline]
     pub(super) fn edge_before(&self, vertex: &Vertex, from: Vec3) -> EdgeOf<S> {
         let value = |to: Vec3| vertex.scatter.eval(from, to, Transport::Importance);

@@ -23,7 +23,7 @@ use crate::shade::{Bsdf, BsdfPool, BsdfSample, Transport};
 pub struct LightSubpath {
     /// Densities of all its vertices.
     pub pdfs: SubpathPdfs,
-    /// Those of its vertices that can be connected to.
+    /// Vertices that can be connected to.
     pub vertices: Vec<LightVertex>,
     /// The BSDFs of these.
     pub bsdfs: BsdfPool,
@@ -42,7 +42,7 @@ impl LightSubpath {
     }
 }
 
-/// What becomes of a light sub-path.
+/// The uses of a light sub-path.
 #[derive(Default)]
 pub struct LightSubpathUse<'a> {
     /// Number of the sub-path among those of the iteration.

@@ -10,7 +10,7 @@
 //!                                                         └ endpoint (hits, next event) → film
 //! ```
 //!
-//! What a technique (s, t) is depends on its ends: s = 0 the eye walk met a light; s = 1, t ≥ 2 next event; s ≥ 2, t ≥ 2 a connection;
+//! A technique (s, t) is told by its ends: s = 0 the eye walk met a light; s = 1, t ≥ 2 next event; s ≥ 2, t ≥ 2 a connection;
 //! t = 1 a splat of the light image, to which the light sub-paths of the full film contribute, also when only part of it is rendered.
 //!
 //! Weights are `mis`'s. Visibility rays wait in queues and go out in packets; nothing depends on how these were filled.

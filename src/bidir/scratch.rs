@@ -2,7 +2,7 @@
 
 use super::contribution::{Contribution, ContributionKind};
 use super::light_subpath::LightSubpath;
-use crate::film::{FilmTile, Part, SampleBuffer, Splat};
+use crate::film::{FilmTile, SampleBuffer, Splat};
 use crate::mis::{ConnectionFactor, EyeSubpathPdfs};
 use crate::path::{ShadowQueue, Transmittance};
 use crate::ray::{RayKind, RayStats, Tracer};
@@ -149,12 +149,7 @@ pub struct TileSink<'a> {
 impl ContributionSink for TileSink<'_> {
     #[inline]
     fn add(&mut self, kind: ContributionKind, contribution: Contribution) {
-        let part = match kind {
-            ContributionKind::Hit => Part::AtOnce,
-            ContributionKind::NextEvent => Part::Direct,
-            ContributionKind::Connection => Part::Connection,
-        };
-        self.samples.add(part, self.tile.index(contribution.x, contribution.y), contribution.weighted());
+        self.samples.add(kind, self.tile.index(contribution.x, contribution.y), contribution.weighted());
         if self.stride.probes(contribution.y * self.film_width + contribution.x) {
             self.probed.push(contribution);
         }

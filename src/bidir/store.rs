@@ -28,7 +28,7 @@ pub struct VertexStore {
 #[derive(Debug, Default)]
 struct SpatialOrder {
     positions: Vec<Vec3>,
-    /// Of each vertex its chunk, and its number there.
+    /// For each vertex its chunk, and its number there.
     sources: Vec<(u16, u32)>,
     /// Morton codes with numbers of vertices, and codes alone.
     keys: Vec<(u32, u32)>,

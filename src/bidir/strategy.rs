@@ -51,7 +51,7 @@ pub struct Candidate<'a, L> {
     pub lookup: Option<L>,
 }
 
-/// What strategies draw candidates for an eye vertex from.
+/// An eye vertex, and the light sub-paths from which strategies draw its candidates.
 pub struct EyeVertex<'a, 'v> {
     /// The eye vertex.
     pub vertex: &'v Vertex<'v>,
@@ -124,7 +124,7 @@ pub trait ConnectionStrategy: Send + Sync {
     #[inline]
     fn see(&self, _lookup: &mut Self::Lookup, _y: &SegmentEnd, _tracer: &mut Tracer) {}
 
-    /// What the factor of the edge from a light vertex at `y` to the eye vertex of the look-up depends on; `value` is the adjoint BSDF value
+    /// The argument of the factor of the edge from a light vertex at `y` to the eye vertex of the look-up; `value` is the adjoint BSDF value
     /// at `y` for a direction.
     fn edge(
         &self,

@@ -8,7 +8,7 @@ use crate::shade::{BsdfPool, BsdfView, StoredBsdf, Transport};
 /// A vertex y_{s−1} of a light sub-path, s ≥ 2. There are many of them: they hold only what a connection reads.
 #[derive(Clone, Copy, Debug)]
 pub struct LightVertex {
-    /// Where it is.
+    /// Place of the vertex.
     pub place: StoredPlace,
     /// Unit direction towards y_{s−2}.
     pub wo: Vec3,

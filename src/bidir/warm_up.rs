@@ -13,7 +13,7 @@ use rayon::prelude::*;
 /// Sub-paths in a piece of work.
 const CHUNK: u32 = 64;
 
-/// What is there before the first iteration.
+/// Access to light and eye vertices before the first iteration.
 #[derive(Clone, Copy)]
 pub struct WarmUp<'a> {
     /// Scene and seed.

@@ -59,7 +59,7 @@ impl PointLight {
         PointLight { position: (position - centre).as_vec3(), intensity }
     }
 
-    /// Where it is, relative to the scene's centre.
+    /// Position, relative to the scene's centre.
     pub fn position(&self) -> Vec3 {
         self.position
     }
@@ -120,7 +120,7 @@ impl SpotLight {
         Ok(SpotLight { position, frame, intensity, cutoff, beam, cos_cutoff: cutoff.cos(), cos_beam: beam.cos() })
     }
 
-    /// Where it is, relative to the scene's centre.
+    /// Position, relative to the scene's centre.
     pub fn position(&self) -> Vec3 {
         self.position
     }

@@ -10,7 +10,7 @@ pub mod tile;
 
 pub use pyramid::Pyramid;
 pub use splat::{LightImage, Splat};
-pub use tile::{FilmTile, NonFiniteSource, Part, SampleBuffer};
+pub use tile::{ContributionKind, FilmTile, NonFiniteSource, SampleBuffer};
 
 use crate::math::Rgb;
 
@@ -165,7 +165,7 @@ mod tests {
             buffer.clear(tile.pixels());
             for i in 0..tile.pixels() {
                 let (x, y) = tile.pixel(i);
-                buffer.add(Part::AtOnce, i, Rgb::new(x as f32, y as f32, 1.0));
+                buffer.add(ContributionKind::Hit, i, Rgb::new(x as f32, y as f32, 1.0));
             }
             tile.commit(&buffer, None, 0);
         }
@@ -186,10 +186,10 @@ mod tests {
             let tile = &mut film.tiles[0];
             buffer.clear(tile.pixels());
             for i in 0..16 {
-                buffer.add(Part::AtOnce, i, Rgb::WHITE);
+                buffer.add(ContributionKind::Hit, i, Rgb::WHITE);
             }
             if iteration == 1 {
-                buffer.add(Part::AtOnce, 6, Rgb::new(0.0, f32::NAN, 0.0));
+                buffer.add(ContributionKind::Hit, 6, Rgb::new(0.0, f32::NAN, 0.0));
             }
             tile.commit(&buffer, None, iteration);
         }

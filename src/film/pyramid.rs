@@ -16,7 +16,7 @@ pub struct Pyramid {
 
 /// Which of a technique's two pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum PyramidLayer {
     /// By itself.
     Raw = 0,
     /// As it goes into the picture.
@@ -77,7 +77,7 @@ impl Pyramid {
     }
 
     /// The picture of technique (s, k + 1 − s), row by row.
-    pub fn picture(&self, (k, s): (usize, usize), side: Side) -> Vec<Rgb> {
+    pub fn picture(&self, (k, s): (usize, usize), side: PyramidLayer) -> Vec<Rgb> {
         let scale = 1.0 / self.iterations.max(1) as f64;
         let sums = &self.sums[Pyramid::number(k, s)][side as usize];
         sums.iter().map(|p| Rgb::from(p.map(|v| (v * scale) as f32))).collect()
@@ -94,11 +94,11 @@ impl Pyramid {
         let (width, height) = (2 * block + 2 * GAP, self.max_edges * (h + GAP) + GAP);
         let mut sheet = vec![Rgb::grey(0.05); width * height];
         for (k, s) in self.techniques() {
-            for side in [Side::Raw, Side::Weighted] {
+            for side in [PyramidLayer::Raw, PyramidLayer::Weighted] {
                 let small = shrink(&self.picture((k, s), side), self.window[2] as usize, step, (w, h));
                 // Centred in its row, so that neighbours of a technique are its neighbours on the sheet.
                 let indent = (columns - (k + 1)) * (w + GAP) / 2;
-                let left = GAP + indent + s * (w + GAP) + if side == Side::Raw { 0 } else { block + 2 * GAP };
+                let left = GAP + indent + s * (w + GAP) + if side == PyramidLayer::Raw { 0 } else { block + 2 * GAP };
                 let top = GAP + (k - 1) * (h + GAP);
                 for (row, pixels) in small.chunks_exact(w).enumerate() {
                     let at = (top + row) * width + left;
@@ -141,7 +141,8 @@ mod tests {
         pyramid.add((0, 2), (3, 2), Rgb::new(f32::NAN, 0.0, 0.0), 1.0);
         pyramid.iterations = 1;
         for (n, technique) in pyramid.techniques().enumerate() {
-            let [raw, weighted] = [Side::Raw, Side::Weighted].map(|side| pyramid.picture(technique, side));
+            let [raw, weighted] =
+                [PyramidLayer::Raw, PyramidLayer::Weighted].map(|side| pyramid.picture(technique, side));
             for (i, (r, w)) in raw.iter().zip(&weighted).enumerate() {
                 let expected = if i == 6 { n as f32 + 1.0 } else { 0.0 };
                 assert_eq!((r.r, w.r), (expected, 0.25 * expected));
@@ -157,7 +158,7 @@ mod tests {
         mean.merge(&empty);
         assert_eq!(mean.iterations, 4);
         for technique in pyramid.techniques() {
-            let [one, quarter] = [&pyramid, &mean].map(|p| p.picture(technique, Side::Weighted)[6].r);
+            let [one, quarter] = [&pyramid, &mean].map(|p| p.picture(technique, PyramidLayer::Weighted)[6].r);
             assert_eq!(quarter, 0.25 * one);
         }
     }

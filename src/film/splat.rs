@@ -19,7 +19,7 @@ pub struct Splat {
     /// Number of the vertex on it.
     pub vertex: u32,
     /// Number of the contribution in a replay.
-    pub note: u32,
+    pub replay_index: u32,
     /// Contribution to the pixel.
     pub value: Rgb,
 }
@@ -75,7 +75,7 @@ mod tests {
             y: 2 + i % 7,
             path: i.wrapping_mul(2_654_435_761) % 1000,
             vertex: i,
-            note: 0,
+            replay_index: 0,
             value: Rgb::new(1.0 / (1 + i) as f32, (i as f32).sqrt(), 1e7 * (i % 3) as f32),
         };
         let all: Vec<Splat> = (0..5000).map(splat).collect();

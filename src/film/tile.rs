@@ -79,15 +79,15 @@ impl FilmTile {
     }
 }
 
-/// Where a contribution to a sample comes from.
+/// The group of techniques that made a contribution to the sample of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(usize)]
-pub enum Part {
-    /// Known at once: the walk met light.
-    AtOnce,
-    /// After a shadow ray of next event.
-    Direct,
-    /// After a shadow ray of a connection.
+pub enum ContributionKind {
+    /// s = 0: an eye sub-path met a light.
+    Hit,
+    /// s = 1: next event.
+    NextEvent,
+    /// s ≥ 2: a connection of two sub-paths.
     Connection,
 }
 
@@ -141,17 +141,17 @@ impl SampleBuffer {
 
     /// Adds light to the sample of pixel `i`; within a part in the order in which it was found.
     #[inline]
-    pub fn add(&mut self, part: Part, i: u32, value: Rgb) {
+    pub fn add(&mut self, part: ContributionKind, i: u32, value: Rgb) {
         self.parts[part as usize][i as usize] += value;
     }
 
     /// Where the sample of pixel `i` stops being finite; `splats` is what the light image adds to it.
     fn non_finite_source(&self, i: u32, splats: Rgb) -> NonFiniteSource {
-        let part = |part: Part| self.parts[part as usize][i as usize];
+        let part = |part: ContributionKind| self.parts[part as usize][i as usize];
         let contributions = [
-            (part(Part::AtOnce), NonFiniteSource::Hit),
-            (part(Part::Direct), NonFiniteSource::NextEvent),
-            (part(Part::Connection), NonFiniteSource::Connection),
+            (part(ContributionKind::Hit), NonFiniteSource::Hit),
+            (part(ContributionKind::NextEvent), NonFiniteSource::NextEvent),
+            (part(ContributionKind::Connection), NonFiniteSource::Connection),
             (splats, NonFiniteSource::LightImage),
         ];
         contributions.into_iter().find(|(v, _)| !v.is_finite()).map_or(NonFiniteSource::Sum, |(_, source)| source)
@@ -167,7 +167,7 @@ mod tests {
     fn the_source_of_a_non_finite_sample_is_told() {
         let nan = Rgb::new(f32::NAN, 0.0, 0.0);
         let large = Rgb::new(0.6 * f32::MAX, 0.0, 0.0);
-        let source = |contributions: &[(Part, Rgb)], splat: Rgb| {
+        let source = |contributions: &[(ContributionKind, Rgb)], splat: Rgb| {
             let window = [0, 0, 3, 2];
             let (mut film, mut buffer) = (Film::new(window), SampleBuffer::default());
             let iteration = film.begin_iteration();
@@ -179,14 +179,17 @@ mod tests {
             places.first().map(|p| (count, p.x, p.y, p.source))
         };
         let at = |source| Some((1, 1, 1, source));
-        assert_eq!(source(&[(Part::AtOnce, Rgb::WHITE)], Rgb::WHITE), None);
-        assert_eq!(source(&[(Part::AtOnce, nan)], Rgb::WHITE), at(NonFiniteSource::Hit));
+        assert_eq!(source(&[(ContributionKind::Hit, Rgb::WHITE)], Rgb::WHITE), None);
+        assert_eq!(source(&[(ContributionKind::Hit, nan)], Rgb::WHITE), at(NonFiniteSource::Hit));
         assert_eq!(
-            source(&[(Part::Direct, nan), (Part::AtOnce, Rgb::WHITE)], Rgb::WHITE),
+            source(&[(ContributionKind::NextEvent, nan), (ContributionKind::Hit, Rgb::WHITE)], Rgb::WHITE),
             at(NonFiniteSource::NextEvent)
         );
-        assert_eq!(source(&[(Part::Connection, nan)], Rgb::WHITE), at(NonFiniteSource::Connection));
+        assert_eq!(source(&[(ContributionKind::Connection, nan)], Rgb::WHITE), at(NonFiniteSource::Connection));
         assert_eq!(source(&[], nan), at(NonFiniteSource::LightImage));
-        assert_eq!(source(&[(Part::AtOnce, large), (Part::Direct, large)], Rgb::BLACK), at(NonFiniteSource::Sum));
+        assert_eq!(
+            source(&[(ContributionKind::Hit, large), (ContributionKind::NextEvent, large)], Rgb::BLACK),
+            at(NonFiniteSource::Sum)
+        );
     }
 }

@@ -12,7 +12,7 @@ use std::io::Cursor;
 
 const NAME: &str = "EXR";
 
-/// What may be interleaved into a picture, in the order of preference.
+/// Channels that can be interleaved into a picture, in the order of preference.
 const SETS: [&[&str]; 3] = [&["R", "G", "B", "A"], &["R", "G", "B"], &["Y"]];
 
 fn fault(e: exr::error::Error) -> ImageFault {
@@ -53,7 +53,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Image, ImageFault> {
     check_size(width as u64, height as u64, bytes_per_pixel as u64, file_bytes)?;
     let channels = wanted.len();
     check_size(width as u64, height as u64, 4 * channels as u64, u64::MAX)?;
-    // Of each channel of the file: its place in the picture.
+    // For each channel of the file, its place in the picture.
     let place: Vec<Option<usize>> =
         (0..header.channels.list.len()).map(|c| wanted.iter().position(|&w| w == c)).collect();
 

@@ -118,7 +118,7 @@ fn remap(difference: f64, largest: f64) -> f64 {
     if difference < knee { P_T / knee * difference } else { P_T + (difference - knee) / (largest - knee) * (1.0 - P_T) }
 }
 
-/// What the eye still resolves, in Hunt-adjusted L*a*b*.
+/// The picture as far as the eye resolves it, in Hunt-adjusted L*a*b*.
 fn perceived(opponent: &[Colour], width: usize) -> Vec<Colour> {
     let widest = SENSITIVITY.iter().flatten().map(|&(_, b)| b).fold(0.0, f64::max);
     let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i64;

@@ -17,7 +17,7 @@ pub struct Report {
     pub mape: f64,
     /// Mean of d² / (r² + 0.01).
     pub relmse: f64,
-    /// The same without the worst 0.1 % of the pixels (rounded down), so that a few fireflies do not decide.
+    /// relMSE without the worst 0.1 % of the pixels (rounded down), so that a few fireflies do not decide.
     pub relmse_trimmed: f64,
     /// Mean LDR-ꟻLIP of the pictures clipped to [0, 1]; see [`flip::ldr_flip`].
     pub flip: f64,

@@ -42,7 +42,7 @@ impl<'a> Words<'a> {
         word.parse().map_err(|_| ImageFault::damaged(format, format!("expected a number, found \"{}\"", excerpt(word))))
     }
 
-    /// What follows the one white-space byte after the last word.
+    /// The bytes after the one white-space byte that ends the last word.
     fn body(&self) -> &'a [u8] {
         self.bytes.get(self.at + 1..).unwrap_or_default()
     }

@@ -9,7 +9,7 @@ use image::{DynamicImage, ImageFormat};
 use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 
-/// What the numbers in a file mean.
+/// The meaning of the numbers in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Encoding {
     /// sRGB in integer files (PNG, JPEG, TGA, PGM, PPM), linear in float files (EXR, HDR, PFM).
@@ -27,12 +27,12 @@ pub enum Encoding {
 pub struct ImageError {
     /// The file.
     pub path: PathBuf,
-    /// What was wrong with it.
+    /// The fault.
     #[source]
     pub fault: ImageFault,
 }
 
-/// What can be wrong with a picture file.
+/// Faults of picture files.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageFault {
     /// The file could not be opened or read.
@@ -46,7 +46,7 @@ pub enum ImageFault {
     Damaged {
         /// Name of the format.
         format: &'static str,
-        /// What the decoder found.
+        /// The decoder's message.
         reason: String,
     },
     /// A sound file that uses something not supported here.

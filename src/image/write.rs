@@ -15,7 +15,7 @@ pub struct Layer {
     pub channels: Vec<(&'static str, Vec<f32>)>,
 }
 
-/// What a render leaves: a main layer of `R`, `G`, `B` (or one channel, for grey) and any others.
+/// A picture to be written: a main layer of `R`, `G`, `B` (or one channel, for grey) and any others.
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// Pixels in a row.
@@ -58,7 +58,7 @@ pub enum WriteError {
     Picture {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         reason: String,
     },
 }

@@ -16,7 +16,7 @@ pub struct ZTest {
     pub beyond_3: f64,
     /// Largest |z|.
     pub worst: f64,
-    /// What |z| would pass with the probability 0.001 in any of so many independent tests (Šidák 1967).
+    /// The |z| that is passed with the probability 0.001 in any of so many independent tests (Šidák 1967).
     pub threshold: f64,
     /// z of the mean of the picture; the channels of a pixel count as one, different pixels as independent.
     pub whole: f64,

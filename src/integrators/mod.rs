@@ -33,21 +33,21 @@ pub static REGISTRY: &[&IntegratorSpec] = &[
     &importance::IMPORTANCE_CACHING,
 ];
 
-/// What the registry knows of an integrator.
+/// An integrator's entry in the registry.
 pub struct IntegratorSpec {
     /// Name on the command line and in scene files.
     pub name: &'static str,
     /// Other names that scene files use for it.
     pub aliases: &'static [&'static str],
-    /// What it is, in one line of at most 80 characters.
+    /// Description in one line of at most 80 characters.
     pub short: &'static str,
-    /// What it does and when to use it, with the papers that describe it. Paragraphs are separated by a blank line.
+    /// Description in full: the method and its uses, with the papers. Paragraphs are separated by a blank line.
     pub long: &'static str,
     /// Parameters, in groups that several integrators may share.
     pub params: &'static [&'static [ParamSpec]],
     /// Its expectation is the rendering equation's solution.
     pub unbiased: bool,
-    /// What is missing from its pictures of a scene with these features, if anything is.
+    /// Light that is missing from its pictures of a scene with these features, if any is.
     pub limitations: fn(Features) -> Option<String>,
     /// Builds it.
     pub build: fn(&Params) -> Box<dyn Integrator>,
@@ -71,7 +71,7 @@ pub trait Integrator: Send {
     /// number of threads. The caller has begun the iteration ([`Film::begin_iteration`]), so that the film counts it already.
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats;
 
-    /// What it has learnt from the iterations so far, for a checkpoint.
+    /// State after the iterations so far, for a checkpoint.
     fn state(&self) -> Vec<u8> {
         vec![]
     }
@@ -81,7 +81,7 @@ pub trait Integrator: Send {
         state.is_empty()
     }
 
-    /// What it decided by itself, for people to read.
+    /// Its own decisions, for people to read.
     fn notes(&self) -> Vec<String> {
         vec![]
     }
@@ -91,7 +91,7 @@ pub trait Integrator: Send {
         false
     }
 
-    /// What has been kept since.
+    /// The pictures of techniques that have been kept since.
     fn pyramid(&self) -> Option<&Pyramid> {
         None
     }

@@ -1,4 +1,4 @@
-//! What all mesh files share: options, errors, and the repairs every mesh gets before it enters a scene.
+//! Common parts of all mesh readers: options, errors, and the repairs every mesh gets before it enters a scene.
 
 use super::normals;
 use crate::scene::MeshDesc;
@@ -40,7 +40,7 @@ pub(super) enum Place {
 pub(super) enum MeshError {
     /// The file system's reason.
     Io(std::io::Error),
-    /// What is wrong in it.
+    /// The mistake in the file.
     Bad { place: Place, message: String },
 }
 

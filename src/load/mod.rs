@@ -22,7 +22,7 @@ use glam::DVec3;
 use report::Report;
 use std::path::Path;
 
-/// What the caller wants to be done differently.
+/// Options of loading.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
     /// `-D name=value`: replaces `$name` in an XML file and its `<default>`.
@@ -38,9 +38,9 @@ pub struct LoadOptions {
 pub struct CameraOptions {
     /// Where it stands.
     pub origin: Option<DVec3>,
-    /// What it looks at.
+    /// The point that the camera looks at.
     pub target: Option<DVec3>,
-    /// What is up in the picture (+y).
+    /// The direction that is up in the picture (+y).
     pub up: Option<DVec3>,
     /// Horizontal field of view in degrees (40).
     pub fov: Option<f64>,

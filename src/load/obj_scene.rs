@@ -221,7 +221,7 @@ impl Model {
         self.scene
     }
 
-    /// What a material becomes: mirrors and glass by the illumination model, else a diffuse base with a Phong
+    /// The BSDF of a material: mirrors and glass by the illumination model, else a diffuse base with a Phong
     /// highlight; seen from both sides unless it transmits.
     fn material(&mut self, mtl: &Mtl, folder: &Path, span: Option<Span>) -> (BsdfId, Option<AreaEmission>) {
         let emission = self.color(mtl.map_emission.as_ref(), mtl.emission.unwrap_or(Rgb::BLACK), folder, span.clone());

@@ -104,7 +104,7 @@ struct Inflated<R> {
     reader: R,
     /// Bytes that can still come at most.
     limit: u64,
-    /// Of the mesh in the file, for messages.
+    /// Number of the mesh in the file, for messages.
     offset: u64,
 }
 

@@ -5,7 +5,7 @@
 
 use super::{Rgb, Vec3};
 
-/// What happens to light at a smooth dielectric interface.
+/// Reflection and refraction of light at a smooth dielectric interface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interface {
     /// Fraction reflected; 1 for total internal reflection.

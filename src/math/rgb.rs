@@ -25,7 +25,7 @@ impl Rgb {
         Rgb { r, g, b }
     }
 
-    /// The same value in every channel.
+    /// One value in every channel.
     pub const fn grey(v: f32) -> Rgb {
         Rgb { r: v, g: v, b: v }
     }

@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(verdict(row([1.3, 1.31, 1.29], 10.0, [0.5, 0.51, 0.49])), (true, false));
         // The whole machine was slower.
         assert_eq!(verdict(row([1.3, 1.31, 1.29], 13.0, [0.5, 0.51, 0.49])), (false, false));
-        // Nobody can tell from times like these.
+        // Times like these tell nothing.
         assert_eq!(verdict(row([1.0, 1.9, 0.9], 10.0, [0.5, 0.51, 0.49])), (false, false));
         assert_eq!(verdict(row([1.0, 1.01, 0.99], 10.0, [0.8, 0.81, 0.79])), (false, true));
         assert!(against(&[], &[old]).is_empty());

@@ -88,7 +88,7 @@ impl CostMap {
                     |integrator, i| {
                         let (x, y) = (i % size[0] * step + step / 2, i / size[0] * step + step / 2);
                         let pixel = (x0 + x.min(width - 1), y0 + y.min(height - 1));
-                        count(&integrator.replay(&Iteration { scene, seed: seed.wrapping_add(more), index: 0 }, pixel))
+                        count(&integrator.replay(&Iteration::new(scene, seed.wrapping_add(more), 0), pixel))
                     },
                 )
                 .collect()
@@ -96,7 +96,7 @@ impl CostMap {
         // One sample tells how many a coarse map may have, and that how long a fine one takes. Methods that learn
         // prepare a whole iteration for every sample.
         let start = Instant::now();
-        let alone = Iteration { scene, seed, index: 0 };
+        let alone = Iteration::new(scene, seed, 0);
         method.build().replay(&alone, (x0 + width / 2, y0 + height / 2));
         let few = (0.25 * time.as_secs_f64() / start.elapsed().as_secs_f64().max(1e-6)).clamp(16.0, 256.0);
         let start = Instant::now();

@@ -20,20 +20,20 @@ use serde::{Deserialize, Serialize};
 /// Numbers of samples relative to the full ones.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SampleAllocation {
-    /// Of techniques with t = 1: light sub-paths for the light image.
+    /// Samples of techniques with t = 1: light sub-paths for the light image.
     pub light_image: f32,
-    /// Of connections, s ≥ 2 and t ≥ 2.
+    /// Samples of connections, s ≥ 2 and t ≥ 2.
     pub connections: f32,
 }
 
 /// Costs of an iteration at full allocation, in any unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AllocationCosts {
-    /// Of the techniques that are always used.
+    /// Cost of the techniques that are always used.
     pub base: f64,
-    /// Of light sub-paths for the light image.
+    /// Cost of light sub-paths for the light image.
     pub light_image: f64,
-    /// Of connections.
+    /// Cost of connections.
     pub connections: f64,
 }
 
@@ -146,7 +146,7 @@ impl EfficiencyEstimator {
                 *first = sum.map(|v| v as f32);
                 return -squares;
             }
-            // Of two equal samples, twice ½ (X₁ − X₂)².
+            // Twice ½ (X₁ − X₂)², since there are two samples.
             square(std::array::from_fn(|i| sum[i] - f64::from(first[i]))) - squares
         };
         let full = first.last_mut().map_or(0.0, |first| increase(&SampleAllocation::FULL, first));

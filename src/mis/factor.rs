@@ -36,7 +36,7 @@ pub struct IncidentSubpath {
 
 /// c of connections with s ≥ 2 and t ≥ 2.
 pub trait ConnectionFactor: Clone + Send + Sync {
-    /// What c of the connection of y_{s−1} and an eye vertex z depends on besides the light sub-path: knowledge from earlier iterations at
+    /// The argument of c of the connection of y_{s−1} and an eye vertex z besides the light sub-path: knowledge from earlier iterations at
     /// and around z.
     type Edge: Copy + Default + Send + Sync;
 

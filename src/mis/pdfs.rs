@@ -217,13 +217,13 @@ impl<F: ConnectionFactor> EyeSubpathPdfs<F> {
         }
     }
 
-    /// What light meets on its way back, for each vertex.
+    /// Values and densities of light on its way back, for each vertex.
     #[inline]
     pub fn reverse(&self) -> &[ReverseTransport] {
         &self.reverse
     }
 
-    /// What factors of the edges depend on, for each vertex that an edge leads from.
+    /// Arguments of the factors of edges, for each vertex that an edge leads from.
     #[inline]
     pub fn edges(&self) -> &[F::Edge] {
         &self.edges

@@ -32,7 +32,7 @@ pub struct EndpointPdfs {
 }
 
 impl EndpointPdfs {
-    /// Of a sub-path without vertices.
+    /// The densities of a sub-path without vertices.
     pub const NONE: EndpointPdfs = EndpointPdfs { pdf_rev: AreaPdf(0.0), pdf_rev_prev: SolidAnglePdf(0.0) };
 }
 
@@ -56,9 +56,9 @@ pub fn next_event_factor(direct: SolidAnglePdf, area_jacobian: f32, origin: Area
 pub struct ReversePath<'a, F: ConnectionFactor> {
     /// Value and density at each eye vertex but the last.
     pub vertices: &'a [ReverseTransport],
-    /// What the factor of the edge from each eye vertex but the last to the vertex before depends on.
+    /// Arguments of the factor of the edge from each eye vertex but the last to the vertex before.
     pub edges: &'a [F::Edge],
-    /// The same of the edge from z_{t−1} to z_{t−2}.
+    /// Argument of the factor of the edge from z_{t−1} to z_{t−2}.
     pub last_edge: F::Edge,
     /// β_L of the light sub-path on arriving at z_{t−1}; if that is on the light itself, on arriving at z_{t−2}.
     pub throughput: Rgb,
@@ -80,7 +80,7 @@ pub struct ConnectedPath<'a, F: ConnectionFactor> {
     pub emitter: EmitterFactors,
     /// c of this connection, if s ≥ 2 and t ≥ 2; else 1.
     pub connection_factor: f32,
-    /// What factors of connections along the eye sub-path depend on.
+    /// Arguments of the factors of connections along the eye sub-path.
     pub reverse: ReversePath<'a, F>,
 }
 

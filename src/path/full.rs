@@ -16,7 +16,7 @@ pub struct Interior {
     pub bsdf: Bsdf,
     /// The normal that the choice of a light may use here.
     pub light_choice_normal: Option<Vec3>,
-    /// Of a delta event: the discrete probabilities of going on towards the lens when coming from the light, and the reverse; and the
+    /// Delta events only: the discrete probabilities of going on towards the lens when coming from the light, and the reverse; and the
     /// value for light that goes on towards the lens.
     pub delta: Option<([SolidAnglePdf; 2], Rgb)>,
 }

@@ -3,7 +3,7 @@
 use crate::prepared::PreparedScene;
 use crate::ray::Tracer;
 
-/// What an iteration renders.
+/// One iteration of a render.
 #[derive(Clone, Copy)]
 pub struct Iteration<'a> {
     /// The scene.
@@ -12,12 +12,16 @@ pub struct Iteration<'a> {
     pub seed: u64,
     /// Number of the iteration, from zero.
     pub index: u64,
+    /// Time of the iteration in the shutter interval [0, 1). Light vertices are shared by all pixels, so that all paths of an iteration have
+    /// one time.
+    pub time: f32,
 }
 
 impl<'a> Iteration<'a> {
     /// The iteration `index` of the render of `scene` with `seed`.
     pub fn new(scene: &'a PreparedScene, seed: u64, index: u64) -> Iteration<'a> {
-        Iteration { scene, seed, index }
+        // Scenes do not move yet: every time shows the same.
+        Iteration { scene, seed, index, time: 0.0 }
     }
 
     /// Another iteration of the same render.

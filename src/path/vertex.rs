@@ -193,9 +193,9 @@ scattering!(Bsdf, BsdfView<'_>);
 /// The scattering function of a vertex that a walk has just made.
 #[derive(Clone, Copy, Debug)]
 pub enum Scatter<'a> {
-    /// Of a surface.
+    /// Scattering at a surface.
     Bsdf(&'a Bsdf),
-    /// Of a medium.
+    /// Scattering in a medium.
     Phase(&'a Phase),
 }
 
@@ -262,7 +262,7 @@ impl Scattering for Scatter<'_> {
 pub struct Vertex<'a> {
     /// Number of the vertex, counted from the sub-path's origin: the first vertex after the origin is 1.
     pub index: u32,
-    /// Where it is.
+    /// Place of the vertex.
     pub place: Place<'a>,
     /// The scattering function there, resolved for `wo`.
     pub scatter: Scatter<'a>,

@@ -63,7 +63,7 @@ impl WalkStart {
     }
 }
 
-/// What an integrator does on the way.
+/// The actions of an integrator on the way.
 pub trait WalkHooks {
     /// A vertex was met. Returns whether to go on.
     fn vertex(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool;

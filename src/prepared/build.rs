@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What the caller decides.
+/// Options of preparing.
 #[derive(Clone, Debug)]
 pub struct PrepareOptions {
     /// Who answers questions about rays.
@@ -310,7 +310,7 @@ fn place(part: Part) -> (PlacedMesh, usize) {
         let [a, b, c] = t.map(|i| positions[i as usize]);
         (b - a).cross(c - a)
     };
-    // The same single precision cross product that shading will normalise: what it cannot, has no area.
+    // Shading normalises this single precision cross product: a triangle for which that fails has no area.
     let has_area = |t: &[u32; 3]| {
         let length2 = cross(t).length_squared();
         length2.is_finite() && length2 > f32::MIN_POSITIVE
@@ -410,7 +410,7 @@ fn emitter_lights(
     Ok(())
 }
 
-/// What surrounds the scene.
+/// The radiance of a light that surrounds the scene.
 fn surroundings(kind: &EmitterKind, images: &[ImageDesc]) -> Result<Environment, EmitError> {
     Ok(match kind {
         EmitterKind::Envmap { image, scale, to_world } => match images.get(image.index()) {

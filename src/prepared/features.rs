@@ -1,4 +1,4 @@
-//! What a scene has. Whoever renders may skip what it lacks.
+//! Features of a scene. A renderer may skip the code for features that the scene lacks.
 
 /// A set of features.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

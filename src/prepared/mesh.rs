@@ -4,7 +4,7 @@ use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::BsdfId;
 use crate::shade::SurfacePoint;
 
-/// What shading needs of a mesh beside its triangles.
+/// Data of a mesh for shading, beside its triangles.
 #[derive(Debug, Default)]
 pub struct MeshShading {
     /// Unit normals per vertex, or empty.

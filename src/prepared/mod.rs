@@ -27,7 +27,7 @@ pub struct PreparedScene {
     pub geometry: Arc<Geometry>,
     /// Who answers questions about rays.
     pub query: Box<dyn RayQuery>,
-    /// What shading needs of each mesh of `geometry`.
+    /// Data of each mesh of `geometry` for shading.
     pub meshes: Vec<MeshShading>,
     /// The triangles of `geometry` once more, as hits look them up.
     pub triangles: TriangleTable,
@@ -49,7 +49,7 @@ pub struct PreparedScene {
     pub centre: DVec3,
     /// Radius of a sphere around the origin that holds every triangle.
     pub radius: f32,
-    /// What the scene has.
+    /// Features of the scene.
     pub features: Features,
     /// Seconds that the backend's tree took.
     pub tree_seconds: f64,
@@ -81,7 +81,7 @@ impl PreparedScene {
         self.materials.get(mesh.material)
     }
 
-    /// What is interpolated between vertices, and the place of an instance.
+    /// Interpolated vertex data, and the place of an instance.
     #[inline(never)]
     fn refine(&self, hit: Hit, point: &mut SurfacePoint) {
         let mesh = &self.meshes[hit.mesh as usize];

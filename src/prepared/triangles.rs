@@ -45,7 +45,7 @@ impl Triangle {
     }
 }
 
-/// What a hit needs to know of its mesh, in a form so small that the whole table stays in the cache.
+/// Facts about the mesh of a hit, in a form so small that the whole table stays in the cache.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshEntry {
     /// Number of the mesh's first triangle in the table.
@@ -97,7 +97,7 @@ impl TriangleTable {
         std::mem::size_of_val(&self.meshes[..]) + std::mem::size_of_val(&self.triangles[..])
     }
 
-    /// Of the mesh that was hit.
+    /// Facts about the mesh that was hit.
     #[inline]
     pub fn mesh(&self, hit: &Hit) -> &MeshEntry {
         &self.meshes[hit.mesh as usize]

@@ -19,7 +19,7 @@ pub struct Agreement {
     pub ties: u64,
     /// Another triangle at another distance.
     pub other_surface: u64,
-    /// The same triangle at a distance that differs by more than the tolerance (grazing rays).
+    /// One triangle at a distance that differs by more than the tolerance (grazing rays).
     pub distance: u64,
     /// Segments compared.
     pub segments: u64,

@@ -26,7 +26,7 @@ mod sys {
 }
 use sys::*;
 
-/// What differs between the versions.
+/// Differences between the versions.
 #[cfg(embree3)]
 mod version {
     use super::sys::*;
@@ -62,7 +62,7 @@ mod version {
     }
 }
 
-/// What differs between the versions.
+/// Differences between the versions.
 #[cfg(embree4)]
 mod version {
     use super::sys::*;

@@ -63,7 +63,7 @@ impl Ray {
     }
 }
 
-/// What a ray met first.
+/// The first intersection of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Ray parameter.

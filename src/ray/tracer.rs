@@ -3,7 +3,7 @@
 //! Every query would cost more in clock reads than it may, so one call in a prime number is timed and the mean stands for the rest;
 //! the clock's own cost, measured once, is taken off.
 //!
-//! What is measured is how long a query takes by itself: a reading of the clock waits for all that was begun before it, and nothing that
+//! The measured time is that of a query by itself: a reading of the clock waits for all that was begun before it, and nothing that
 //! comes later may begin. Between queries a processor overlaps both, so the sum is more than a profiler finds inside the backend
 //! (path tracing a Cornell box, 0.65 of the time against 0.43). The rays of `profile`'s replay, which overlap with each other alone, give
 //! the smaller number.
@@ -15,7 +15,7 @@ use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
 
-/// What a ray is for.
+/// The purpose of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(usize)]
 pub enum RayKind {
@@ -37,7 +37,7 @@ pub enum RayKind {
     Cache,
     /// Between a cache point and a light vertex.
     ShadowPmf,
-    /// The same, for a weight.
+    /// Between a cache point and a light vertex, for a weight.
     ShadowWeight,
 }
 
@@ -91,7 +91,7 @@ static TRACERS: AtomicU32 = AtomicU32::new(0);
 pub struct KindStats {
     /// Rays traced.
     pub rays: u64,
-    /// Of occlusion rays: those that were blocked.
+    /// Occlusion rays that were blocked.
     pub blocked: u64,
     /// Packets, if they went in packets.
     packets: u64,
@@ -120,7 +120,7 @@ struct Timed {
     ns: u64,
 }
 
-/// What takes longer, in nanoseconds, was interrupted by another program and says nothing.
+/// A query that takes longer, in nanoseconds, was interrupted by another program and says nothing.
 const INTERRUPTED: u64 = 100_000;
 
 impl Timed {
@@ -240,14 +240,14 @@ impl RayStats {
 
 /// The closest hit of the ray with these numbers by a virtual call.
 #[inline(never)]
-fn elsewhere(query: &dyn RayQuery, o: [f32; 3], d: [f32; 3], [t_min, t_max]: [f32; 2]) -> Option<Hit> {
+fn closest_virtual(query: &dyn RayQuery, o: [f32; 3], d: [f32; 3], [t_min, t_max]: [f32; 2]) -> Option<Hit> {
     query.closest(&Ray { o: o.into(), d: d.into(), t_min, t_max })
 }
 
 /// One thread's access to the backend.
 pub struct Tracer<'a> {
     query: &'a dyn RayQuery,
-    /// The same if it is Embree, which is called directly: a ray then goes from the registers it was made in to where Embree reads
+    /// The query if it is Embree, which is called directly: a ray then goes from the registers it was made in to where Embree reads
     /// it, and the hit comes back into registers.
     #[cfg(any(embree3, embree4))]
     embree: Option<&'a EmbreeScene>,
@@ -274,14 +274,14 @@ impl<'a> Tracer<'a> {
 
     /// It is the next query's turn to be timed.
     #[inline(always)]
-    fn its_turn(&mut self) -> bool {
+    fn should_time(&mut self) -> bool {
         self.until_timed -= 1;
         self.until_timed == 0
     }
 
     /// Makes a query on the clock.
     #[inline]
-    fn on_the_clock<T>(&mut self, kind: RayKind, query: impl FnOnce(&dyn RayQuery) -> T) -> T {
+    fn timed<T>(&mut self, kind: RayKind, query: impl FnOnce(&dyn RayQuery) -> T) -> T {
         self.until_timed = TIMED_ONE_IN;
         let start = warm_clock();
         let answer = query(self.query);
@@ -312,8 +312,8 @@ impl<'a> Tracer<'a> {
     /// The closest hit when it is its turn to be timed. Apart and part by part, so that the way of all other rays stays in registers.
     #[cold]
     #[inline(never)]
-    fn closest_on_the_clock(&mut self, o: [f32; 3], d: [f32; 3], t: [f32; 2], kind: RayKind) -> Option<Hit> {
-        self.on_the_clock(kind, |query| elsewhere(query, o, d, t))
+    fn closest_timed(&mut self, o: [f32; 3], d: [f32; 3], t: [f32; 2], kind: RayKind) -> Option<Hit> {
+        self.timed(kind, |query| closest_virtual(query, o, d, t))
     }
 
     /// The first thing the ray meets; a ray that is not valid meets nothing and is counted.
@@ -327,14 +327,14 @@ impl<'a> Tracer<'a> {
         self.stats.kinds[kind as usize].rays += 1;
         // Part by part both ways: what is only ever passed by reference on this way must not be kept in memory on the other.
         let (o, d, t) = ([ray.o.x, ray.o.y, ray.o.z], [ray.d.x, ray.d.y, ray.d.z], [ray.t_min, ray.t_max]);
-        let hit = if self.its_turn() {
-            self.closest_on_the_clock(o, d, t, kind)
+        let hit = if self.should_time() {
+            self.closest_timed(o, d, t, kind)
         } else {
             #[cfg(any(embree3, embree4))]
             if let Some(embree) = self.embree {
                 return embree.first_hit(ray);
             }
-            elsewhere(self.query, o, d, t)
+            closest_virtual(self.query, o, d, t)
         }?;
         Some(Hit { t: hit.t, u: hit.u, v: hit.v, triangle: hit.triangle, mesh: hit.mesh, instance: hit.instance })
     }
@@ -343,8 +343,8 @@ impl<'a> Tracer<'a> {
     #[inline]
     pub fn occluded_packet(&mut self, packet: &SegmentPacket, kind: RayKind) -> u16 {
         debug_assert!(packet.len <= PACKET);
-        let (mask, invalid) = if self.its_turn() {
-            self.on_the_clock(kind, |query| query.occluded_packet(packet))
+        let (mask, invalid) = if self.should_time() {
+            self.timed(kind, |query| query.occluded_packet(packet))
         } else {
             self.query.occluded_packet(packet)
         };

@@ -169,7 +169,7 @@ fn encode(contents: &ContentsRef, file: &mut dyn Write) -> std::io::Result<()> {
     let mut out = BufWriter::new(Checksummed { file, checksum: crc32fast::Hasher::new(), error: None });
     writeln!(out, "{NAME}{VERSION}")?;
     if let Err(e) = postcard::to_io(contents, &mut out) {
-        // Of a failed write postcard says only that it failed.
+        // postcard does not say why a write failed.
         return Err(out.get_mut().error.take().unwrap_or_else(|| std::io::Error::other(e)));
     }
     let Checksummed { file, checksum, .. } = out.into_inner().map_err(|e| e.into_error())?;

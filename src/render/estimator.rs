@@ -33,7 +33,7 @@ impl Estimator {
     pub fn restore(&mut self, scene: &PreparedScene, film: Film, state: &[u8]) -> bool {
         self.film = film;
         self.resumed_at = self.film.iterations();
-        let next = Iteration { scene, seed: self.seed, index: self.resumed_at };
+        let next = Iteration::new(scene, self.seed, self.resumed_at);
         self.integrator.restore(&next, state)
     }
 
@@ -41,7 +41,7 @@ impl Estimator {
     /// alone.
     pub fn iterate(&mut self, scene: &PreparedScene) -> RayStats {
         let index = self.film.begin_iteration();
-        let iteration = Iteration { scene, seed: self.seed, index };
+        let iteration = Iteration::new(scene, self.seed, index);
         let rays = self.clock.time(|| self.integrator.iterate(&iteration, &mut self.film));
         self.rays.merge(&rays);
         rays

@@ -2,7 +2,7 @@
 
 use super::stats::Clock;
 use super::{JobError, OutputRequest, Plan, PreparedJob, RenderRequest, RenderStats, Rendered, Stop, aov};
-use crate::film::pyramid::Side;
+use crate::film::pyramid::PyramidLayer;
 use crate::film::{Film, Pyramid};
 use crate::image::{Layer, OutputFormat, Picture, atomic_write, write_picture};
 use crate::math::Rgb;
@@ -118,7 +118,7 @@ fn write_pyramid(
     std::fs::create_dir_all(folder).map_err(|e| JobError::File(format!("{}: {e}", folder.display())))?;
     let [width, height] = pyramid.size();
     let mut written = vec![];
-    for (name, side) in [("raw.exr", Side::Raw), ("weighted.exr", Side::Weighted)] {
+    for (name, side) in [("raw.exr", PyramidLayer::Raw), ("weighted.exr", PyramidLayer::Weighted)] {
         let mut sum = vec![Rgb::BLACK; width as usize * height as usize];
         let mut layers = vec![];
         for (k, s) in pyramid.techniques() {

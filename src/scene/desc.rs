@@ -42,7 +42,7 @@ pub struct SceneDesc {
     pub path: PathBuf,
     /// Cameras, at least one when valid; the first is rendered.
     pub sensors: Vec<SensorDesc>,
-    /// What the file proposes for rendering; the command line overrides it.
+    /// Settings of the render that the file proposes; the command line overrides them.
     pub integrator: Option<IntegratorDesc>,
     /// Textures.
     pub textures: Vec<TextureDesc>,
@@ -157,7 +157,7 @@ pub struct IntegratorDesc {
 /// A colour that may vary over a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColorDesc {
-    /// The same everywhere (linear Rec. 709).
+    /// One colour everywhere (linear Rec. 709).
     Constant(Rgb),
     /// Looked up.
     Texture(TextureId),
@@ -166,7 +166,7 @@ pub enum ColorDesc {
 /// A number that may vary over a surface (a texture's luminance or its single channel).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ScalarDesc {
-    /// The same everywhere.
+    /// One value everywhere.
     Constant(f32),
     /// Looked up.
     Texture(TextureId),
@@ -208,7 +208,7 @@ pub enum TextureFilter {
     Bilinear,
 }
 
-/// What lies beyond the picture's edges.
+/// Texture values beyond the picture's edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WrapMode {
     /// The picture again.
@@ -254,7 +254,7 @@ pub struct ShapeDesc {
     pub to_world: DMat4,
     /// Material; `None` is Mitsuba's default, a diffuse reflectance of one half.
     pub bsdf: Option<BsdfId>,
-    /// What it emits, if it does.
+    /// The emitted radiance, if it emits.
     pub emission: Option<AreaEmission>,
     /// Turns the surface inside out.
     pub flip_normals: bool,
@@ -294,7 +294,7 @@ pub struct InstanceDesc {
 /// A light that is not a surface.
 #[derive(Clone, Debug)]
 pub struct EmitterDesc {
-    /// What it is.
+    /// Its kind.
     pub kind: EmitterKind,
     /// Where it stands.
     pub span: Option<Span>,
@@ -328,7 +328,7 @@ pub enum EmitterKind {
         /// Irradiance on a surface that faces it, W/m².
         irradiance: Rgb,
     },
-    /// The same radiance from everywhere.
+    /// Constant radiance from all directions.
     Constant {
         /// Radiance.
         radiance: Rgb,

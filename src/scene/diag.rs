@@ -56,13 +56,13 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// Stable name of the kind of problem, e.g. `scene::unknown-plugin`.
     pub code: &'static str,
-    /// What is wrong, in one sentence.
+    /// The mistake, in one sentence.
     pub message: String,
     /// Where, if the problem has a place in a text file.
     pub span: Option<Span>,
     /// Shown at the place itself: what was expected, the nearest known name.
     pub label: Option<String>,
-    /// What to do, or what happens now.
+    /// A remedy, or the consequence.
     pub help: Option<String>,
 }
 

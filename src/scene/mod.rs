@@ -1,4 +1,4 @@
-//! What a scene file says, as plain data with source spans ([`desc`], materials in [`bsdf`]), and what is wrong with it
+//! The content of a scene file, as plain data with source spans ([`desc`], materials in [`bsdf`]), and what is wrong with it
 //! ([`diag`], [`validate`]). No acceleration structures, nothing that renders.
 
 pub mod bsdf;

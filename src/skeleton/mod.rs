@@ -29,7 +29,7 @@ pub const DEFAULT_CELLS: usize = 120;
 /// A place in the middle of empty space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
-    /// Where it is, in the space of the prepared scene.
+    /// Position, in the space of the prepared scene.
     pub position: Vec3,
     /// Radius of the largest empty ball around it, in scene units: the distance to the middle of the nearest solid
     /// cube.

@@ -16,7 +16,8 @@ use std::ops::RangeInclusive;
 
 /// Buckets per point: more of them hold fewer points of other cells, but take more memory.
 const BUCKETS_PER_POINT: usize = 2;
-/// Fewest buckets: more than a run of cells along x, so that a run meets no bucket twice.
+/// Fewest buckets: more than the cells of a run along x (three, up to six where coordinates are rounded coarsely), so that a
+/// run meets no bucket twice.
 const MIN_BUCKETS: usize = 8;
 /// Most cells along an axis.
 const MAX_CELLS: f32 = (1 << 20) as f32;
@@ -62,9 +63,9 @@ impl HashGrid {
         let bounds = if bounds.min.is_finite() { bounds } else { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } };
         self.radius = radius;
         self.origin = bounds.min;
-        // A little longer than the radius: a query's interval, which has a margin for rounding, spans three cells and
-        // never four.
-        self.scale = 1.0 / (radius * 1.00001).max(bounds.extent().max_element() / MAX_CELLS).max(1e-30);
+        // A little longer than half of a query's interval, which therefore spans three cells and never four.
+        let length = (self.margin() * 1.00001).max(bounds.extent().max_element() / MAX_CELLS);
+        self.scale = 1.0 / length;
         self.last = [0, 1, 2].map(|axis| self.cell(bounds.max[axis], axis));
         let buckets = (positions.len() * BUCKETS_PER_POINT).next_power_of_two().max(MIN_BUCKETS);
         self.bits = buckets.ilog2();
@@ -126,6 +127,13 @@ impl HashGrid {
         }
     }
 
+    /// Largest difference of a coordinate between a point and a query that finds it. Squares of distances are rounded, and
+    /// those of the smallest numbers are zero: a margin over the radius covers both.
+    #[inline]
+    fn margin(&self) -> f32 {
+        (self.radius * (1.0 + 1e-6)).max(1e-22)
+    }
+
     /// Cell of a coordinate: monotone in it.
     #[inline]
     fn cell(&self, coordinate: f32, axis: usize) -> i32 {
@@ -135,8 +143,7 @@ impl HashGrid {
     /// Cells that hold all points whose coordinate differs from `centre` by at most the radius.
     #[inline]
     fn cells_around(&self, centre: f32, axis: usize) -> RangeInclusive<i32> {
-        // Squares of distances round, and vanish when small: the margin covers both.
-        let margin = (self.radius * (1.0 + 1e-6)).max(1e-22);
+        let margin = self.margin();
         self.cell(centre - margin, axis).max(0)..=self.cell(centre + margin, axis).min(self.last[axis])
     }
 

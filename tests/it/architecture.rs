@@ -13,7 +13,7 @@ const UNSAFE_FILE: &str = "ray/embree.rs";
 const NO_UNWRAP: [&str; 3] = ["load", "app", "image"];
 const PRINTS: [&str; 5] = ["println", "eprintln", "print", "eprint", "dbg"];
 
-/// What breaks the rules in one file; `path` is relative to `src`.
+/// Violations of the rules in one file; `path` is relative to `src`.
 fn violations(path: &Path, source: &str, rooms: &[String]) -> Vec<String> {
     let mut found = Vec::new();
     let mut report = |line: usize, what: String| found.push(format!("src/{}:{line}: {what}", path.display()));

@@ -305,7 +305,7 @@ fn full_disk() {
     for ending in ["png", "exr", "pfm"] {
         let name = format!("full.{ending}");
         std::os::unix::fs::symlink("/dev/full", sandbox.path(&name)).unwrap();
-        // What can be written is written all the same.
+        // Outputs that can be written are written.
         let other = format!("good-{ending}.pfm");
         let run = sandbox.run(&format!("render scene.xml -o {name} -o {other}")).expect(3, &[&name, "No space left"]);
         assert!(!run.stderr.contains(&format!("wrote {name}")) && run.stderr.contains(&format!("wrote {other}")));

@@ -368,7 +368,7 @@ fn both_backends_make_the_same_picture() {
     render(&sandbox, "-o obvhs.pfm --spp 16 --query obvhs --stats s.json");
     assert!(stats(&sandbox, "s.json")["backend"].as_str().unwrap().contains("obvhs"));
     let report = json(&sandbox.run("compare --json obvhs.pfm default.pfm").expect(0, &[]).stdout);
-    // The same random numbers: the paths are the same but where a hit's last bits send one elsewhere.
+    // With equal random numbers, paths are equal but where a hit's last bits send one elsewhere.
     let (ratio, mape) = (report["mean_ratio"].as_f64().unwrap(), report["mape"].as_f64().unwrap());
     assert!((ratio - 1.0).abs() < 1e-2 && mape < 1e-2, "{report}");
 }
@@ -428,7 +428,7 @@ fn other_pixels_of_a_texture_are_another_scene() {
     let sandbox = Sandbox::new();
     let texture = "<texture name=\"reflectance\" type=\"bitmap\"><string name=\"filename\" value=\"t.ppm\"/></texture>";
     sandbox.write_box_with("scene.xml", "<rgb name=\"reflectance\" value=\"$red, 0.5, 0.4\"/>", texture);
-    // The same mean, in another order.
+    // An equal mean, in another order.
     sandbox.write("t.ppm", "P3 2 1 255  200 100 50  10 20 30\n");
     render(&sandbox, "--spp 2 --checkpoint c");
     render(&sandbox, "--spp 3 --resume c");
@@ -514,7 +514,7 @@ fn interrupted_renders_are_written() {
     let iterations = stats(&sandbox, "s.json")["iterations"].as_u64().unwrap();
     assert!(iterations > 0);
     assert_eq!(image(&sandbox, "a.pfm").width, 16);
-    // What was saved goes on to the same bits as an uninterrupted render.
+    // A resumed render has the bits of an uninterrupted one.
     render(&sandbox, &format!("-o resumed.pfm --resume c --spp {}", iterations + 2));
     render(&sandbox, &format!("-o whole.pfm --spp {}", iterations + 2));
     assert_eq!(sandbox.read("resumed.pfm"), sandbox.read("whole.pfm"));

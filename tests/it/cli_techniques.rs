@@ -1,4 +1,4 @@
-//! What the command line shows of bidirectional techniques, from outside: the pyramid, replays, switched off techniques.
+//! The command line's view of bidirectional techniques: the pyramid, replays, switched off techniques.
 
 use crate::support::program::Sandbox;
 use lightsieve::image::{Encoding, Image, read_image};

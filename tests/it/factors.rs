@@ -243,7 +243,7 @@ fn vertices_drawn_uniformly() {
             let all: Vec<usize> = set.iter().flat_map(|&k| std::iter::repeat_n(k, VERTICES[k])).collect();
             counts[all[(rng.next_f32() * all.len() as f32) as usize]] += 1;
         }
-        // Of each vertex of its own.
+        // For each vertex of a sub-path.
         let truth = std::array::from_fn(|k| counts[k] as f64 / (SETS as f64 * P[k] * VERTICES[k] as f64));
         let factor = UniformFactor { vertices_per_path: vertices_per_path as f32 };
         let c = f64::from(factor.c(&incident(0), &()));

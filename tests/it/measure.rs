@@ -58,7 +58,7 @@ fn merged_renders_are_one_render_of_all_samples() {
         let mut integrator = (path::SPEC.build)(&path_params());
         for index in 0..spp {
             film.begin_iteration();
-            integrator.iterate(&Iteration { scene: &scene, seed, index }, &mut film);
+            integrator.iterate(&Iteration::new(&scene, seed, index), &mut film);
         }
     }
     let close = |what: &str, found: &[[f64; 3]], expected: &[lightsieve::math::Rgb]| {
@@ -161,7 +161,7 @@ fn a_render_with_a_target_says_how_it_went() {
     assert!(number(&stats["error"]["estimate"]) < 0.1, "{stats}");
     let file = ExrFile::read(&sandbox.path("a.exr")).unwrap();
     assert_eq!(file.text("lightsieve:seed").unwrap().split(' ').count(), 2, "both seeds, so that merging refuses them");
-    // The same bits again, and another limit that comes first.
+    // Equal bits again, and another limit that comes first.
     sandbox.run("render scene.xml --error-target mape=0.1 -o b.exr --threads 1").expect(0, &[]);
     let pixels = |name: &str| ExrFile::read(&sandbox.path(name)).unwrap().channels;
     assert_eq!(pixels("a.exr"), pixels("b.exr"));
@@ -266,7 +266,7 @@ fn a_profile_adds_up() {
     assert!((share - 1.0).abs() < 1e-9);
     assert_eq!(found["replayed"][1], 0);
     assert!(number(&found["replayed"][0]) > 1000.0);
-    // The same rays meet the same things, whoever is asked.
+    // All backends give the same answers to the rays.
     let met: Vec<f64> = found["replay"].as_array().unwrap().iter().map(|r| number(&r["met"])).collect();
     assert!(met.iter().all(|m| (m / met[0] - 1.0).abs() < 1e-2), "{met:?}");
     assert!(met[0] > 0.0);

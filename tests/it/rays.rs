@@ -58,7 +58,7 @@ fn backends_agree_on_every_scene() {
     }
 }
 
-/// The same geometry, scaled and moved as a file might have it and centred as every scene is prepared.
+/// One geometry, scaled and moved as a file might have it and centred as every scene is prepared.
 #[test]
 fn backends_agree_at_any_scale_and_place() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell/cornell.xml");

@@ -117,7 +117,7 @@ fn parameters_do_not_change_the_expectation() {
     }
 }
 
-/// What is learnt from iteration to iteration changes no expectation, and adds no noise that would not average out: the variance of the mean
+/// Knowledge from earlier iterations changes no expectation, and adds no noise that would not average out: the variance of the mean
 /// is a straight line in logarithms, and where it has become small the mean is still that of the path tracer.
 #[test]
 fn variance_falls_with_the_number_of_iterations_and_the_mean_stays() {

@@ -10,7 +10,7 @@ const SPP: u64 = 32;
 /// Size and place: tiny, huge, far away.
 const PLACES: [(f64, DVec3); 3] = [(1e-3, DVec3::ZERO), (1e4, DVec3::ZERO), (1.0, DVec3::new(1000.0, -500.0, 200.0))];
 
-/// The same scene at another place in another size; lights shine so that radiance stays what it was.
+/// A scene at another place in another size; lights shine so that radiance stays what it was.
 fn placed(mut desc: SceneDesc, scale: f64, offset: DVec3) -> SceneDesc {
     let m = DMat4::from_translation(offset) * DMat4::from_scale(DVec3::splat(scale));
     // A camera or a light has a frame of unit length.

@@ -4,7 +4,7 @@
 use crate::support::gallery::{GALLERY, exhibit};
 use crate::support::pictures::{RENDERS, SIGNIFICANCE, chance, prepare};
 use lightsieve::film::Film;
-use lightsieve::film::pyramid::Side;
+use lightsieve::film::pyramid::PyramidLayer;
 use lightsieve::integrators::{Integrator, IntegratorSpec, Iteration, Params, bdpt, importance, light, resampling};
 use lightsieve::math::Rgb;
 use lightsieve::prepared::{Features, PreparedScene};
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Integrator> {
     let mut values = Params::defaults(spec);
-    // What is left out is decided by the picture, of which a crop sees only a part, and leaves few samples of some techniques.
+    // The allocation is decided by the picture, of which a crop sees only a part, and leaves few samples of some techniques.
     if spec.params().any(|p| p.name == "allocation") {
         values.set("allocation", "full").unwrap();
     }
@@ -28,7 +28,7 @@ fn run(scene: &PreparedScene, integrator: &mut dyn Integrator, spp: u64, seed: u
     let mut film = Film::new(scene.window);
     for _ in 0..spp {
         let index = film.begin_iteration();
-        integrator.iterate(&Iteration { scene, seed, index }, &mut film);
+        integrator.iterate(&Iteration::new(scene, seed, index), &mut film);
     }
     assert_eq!(film.non_finite(), (0, vec![]));
     film
@@ -131,7 +131,7 @@ fn techniques_agree(spec: &'static IntegratorSpec, params: &[(&str, &str)]) {
         let size = renders[0].size();
         for k in 2..=EDGES {
             let of = |s: usize| -> Vec<(f64, f64)> {
-                let all: Vec<_> = renders.iter().map(|p| blocks(&p.picture((k, s), Side::Raw), size)).collect();
+                let all: Vec<_> = renders.iter().map(|p| blocks(&p.picture((k, s), PyramidLayer::Raw), size)).collect();
                 moments(&all)
             };
             // Hits of delta lights do not happen, and hits of the sun hardly ever.
@@ -184,7 +184,7 @@ fn the_weighted_pyramid_sums_to_the_picture() {
         let pyramid = integrator.pyramid().unwrap();
         let mut sum = vec![Rgb::BLACK; film.mean().len()];
         for technique in pyramid.techniques() {
-            sum.iter_mut().zip(pyramid.picture(technique, Side::Weighted)).for_each(|(a, b)| *a += b);
+            sum.iter_mut().zip(pyramid.picture(technique, PyramidLayer::Weighted)).for_each(|(a, b)| *a += b);
         }
         for (a, b) in sum.iter().zip(film.mean()) {
             for c in 0..3 {
@@ -238,7 +238,7 @@ fn switched_off_techniques_find_nothing_and_the_others_take_over() {
         let mut integrator = build(&bdpt::SPEC, &[("techniques", techniques), ("max_depth", "4")]);
         integrator.keep_pyramid(scene.window, 4);
         let film = run(&scene, &mut *integrator, 512, 2);
-        let off = integrator.pyramid().unwrap().picture((3, 2), Side::Raw);
+        let off = integrator.pyramid().unwrap().picture((3, 2), PyramidLayer::Raw);
         let sum: f64 = film.mean().iter().map(|p| f64::from(p.luminance())).sum();
         (sum, off.iter().any(|p| !p.is_black()))
     };

@@ -33,7 +33,7 @@ fn found(
     for index in 0..iterations {
         for i in 0..16 {
             let pixel = (x0 + (i % 4) * width / 4, y0 + (i / 4) * height / 4);
-            all.extend(integrator.replay(&Iteration { scene, seed: 5, index }, pixel).contributions);
+            all.extend(integrator.replay(&Iteration::new(scene, 5, index), pixel).contributions);
         }
     }
     all

@@ -7,7 +7,7 @@
 //!   vertices of all light sub-paths; there are no other techniques, so the 1/d² of near ones shows.
 //!
 //! As published, the first two connect an eye vertex to one light sub-path of each length, with the weights of bidirectional path tracing.
-//! These do not count how much likelier than others the sub-paths are drawn that matter, so that other techniques keep most of the
+//! Balance weights do not count how much likelier than others the sub-paths are drawn that matter, so that other techniques keep most of the
 //! light, and noise.
 //!
 //! DEVIATION: by default eye vertices draw from all lengths together, and weights count the density of drawing as those of `ris` do, from

@@ -42,7 +42,7 @@ pub(super) enum RecordPlaces {
     },
 }
 
-/// What users decide.
+/// Settings that users decide.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RecordSettings {
     /// N, light sub-paths of an iteration.

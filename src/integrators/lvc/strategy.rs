@@ -1,6 +1,6 @@
 //! Connections to stored light vertices, drawn uniformly.
 //!
-//! Of V stored vertices of M light sub-paths, each of C draws takes one with the probability 1/V. A connection to the prefix ȳ that ends there
+//! Each of C draws takes one of V stored vertices of M light sub-paths with the probability 1/V. A connection to the prefix ȳ that ends there
 //! is estimated by f / (C M p(ȳ) p(z̄) / V).
 
 use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexStore, WarmUp};

@@ -13,7 +13,7 @@ use crate::bidir::endpoint::{
 };
 use crate::bidir::replay::{ContributionRecord, Replay, SubpathKind};
 use crate::emit::{DirectSample, LightId};
-use crate::film::{Film, FilmTile, Part, SampleBuffer};
+use crate::film::{ContributionKind, Film, FilmTile, SampleBuffer};
 use crate::math::sampler::PathSampler;
 use crate::math::{Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Heuristic;
@@ -101,7 +101,7 @@ impl QueuedLight {
     /// Nothing blocked the ray.
     #[inline]
     fn arrive(self, transmittance: Transmittance, samples: &mut SampleBuffer, replay: Option<&mut Replay>) {
-        samples.add(Part::Direct, self.pixel, self.light * transmittance);
+        samples.add(ContributionKind::NextEvent, self.pixel, self.light * transmittance);
         if let Some(replay) = replay {
             replay.contributions[self.replay_index as usize].visible = true;
         }
@@ -211,7 +211,7 @@ impl<'a> Gather<'a> {
             self.rules.heuristic.weight(edge.pdf_with_survival(), next_event)
         };
         self.record((0, index as usize + 1), raw, weight, true);
-        self.samples.add(Part::AtOnce, self.pixel, raw * weight);
+        self.samples.add(ContributionKind::Hit, self.pixel, raw * weight);
     }
 
     /// Writes a contribution down in a replay; returns its number.

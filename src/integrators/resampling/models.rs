@@ -1,4 +1,4 @@
-//! What the weights of resampled connections know: the connection factors of `mis::factors`, with the look-ups at cache points that they
+//! The knowledge of the weights of resampled connections: the connection factors of `mis::factors`, with the look-ups at cache points that they
 //! need.
 //!
 //! A weight is wanted before its path's own shadow ray is sent, so the rays between cache points and vertices are traced at once and not
@@ -35,7 +35,7 @@ pub(super) trait CacheFactor: ConnectionFactor {
     /// Completes a look-up by the visibility of a light vertex.
     fn see(_caches: &CacheStructure, _lookup: &mut Self::Lookup, _y: &SegmentEnd, _tracer: &mut Tracer) {}
 
-    /// What the factor of the edge from the light vertex at `y`, with the adjoint BSDF value `value`, to the eye vertex depends on.
+    /// The argument of the factor of the edge from the light vertex at `y`, with the adjoint BSDF value `value`, to the eye vertex.
     fn edge(caches: &CacheStructure, lookup: &Self::Lookup, y: &StoredPlace, value: impl Fn(Vec3) -> Rgb)
     -> Self::Edge;
 }

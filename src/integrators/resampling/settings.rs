@@ -2,7 +2,7 @@
 
 use crate::spatial::nearest::Metric;
 
-/// What users decide.
+/// Settings that users decide.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ResamplingSettings {
     /// M; 0: decided by the scene.

@@ -124,7 +124,7 @@ struct Loader<'a> {
     report: &'a mut Report,
 }
 
-/// What is the same for all elements of a file.
+/// Facts that all elements of a file share.
 struct File<'a> {
     source: &'a Arc<Source>,
     legacy: bool,

@@ -32,7 +32,7 @@ use std::path::Path;
 
 pub(super) use transform::look_at;
 
-/// What may stand directly in a scene.
+/// Elements that may stand directly in a scene.
 const TOP_LEVEL: [&str; 10] =
     ["integrator", "sensor", "bsdf", "texture", "shape", "emitter", "medium", "volume", "ref", "spectrum"];
 

@@ -8,7 +8,7 @@
 use super::values::number;
 use crate::math::Rgb;
 
-/// What a spectrum is for.
+/// The use of a spectrum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// Reflectance, refractive index: a factor of light.

@@ -23,7 +23,7 @@ struct Triangle {
     vertices: [Vertex; 3],
 }
 
-/// What a reader makes of a file.
+/// The result of a reader.
 #[derive(Debug, PartialEq)]
 struct Reading {
     /// In the order of the file.

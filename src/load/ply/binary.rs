@@ -337,7 +337,7 @@ fn read_faces<O: Order, R: Read + Send>(
     })
 }
 
-/// What one property of one row holds.
+/// The value of one property in one row.
 enum Row<'a> {
     One(f64),
     List(Scalar, &'a [u8]),

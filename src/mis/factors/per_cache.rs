@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn the_density_of_a_mixture_is_the_mean() {
-        // Of three cache points one does not see the vertex.
+        // One of three cache points does not see the vertex.
         let q = (12.0 / 2.0 + 0.0 + 3.0 / 2.0 + 1.0 / 3.0) / 4.0;
         assert!((c(MIXTURE, 3.0, &near([4.0, 0.0, 1.0])) - 1.0 / (0.005 + 0.995 / q)).abs() < 1e-5);
         let many = PerCacheFactor { stages: Stages { second_stage: Some(1e9), ..STAGES }, ..MIXTURE };

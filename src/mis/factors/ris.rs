@@ -56,7 +56,7 @@ impl Stages {
     }
 }
 
-/// What earlier iterations say of the light at an eye vertex.
+/// The light at an eye vertex, estimated from earlier iterations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NormalizationEstimate {
     /// Q of both targets.

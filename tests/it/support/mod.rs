@@ -1,4 +1,4 @@
-//! What tests of several topics use.
+//! Support for tests of several topics.
 
 pub mod gallery;
 pub mod methods;

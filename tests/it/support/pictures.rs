@@ -1,4 +1,4 @@
-//! What the statistical tests share: scenes, renders with an honest error, and the tests that compare them.
+//! Support for statistical tests: scenes, renders with an honest error, and the tests that compare them.
 //!
 //! One pixel's samples are stratified over iterations, so their sample variance says too much. A picture is therefore the
 //! mean of [`RENDERS`] short renders with different seeds, and its error comes from the spread of these. Two pictures are
@@ -111,7 +111,7 @@ impl Picture {
         Picture { variance: vec![[0.0; 3]; mean.len()], mean, whole: (whole, 0.0), freedom: f64::INFINITY }
     }
 
-    /// The same everywhere.
+    /// One value everywhere.
     pub fn constant(value: f64, pixels: usize) -> Picture {
         Picture::exact(vec![[value; 3]; pixels])
     }
@@ -136,7 +136,7 @@ impl Picture {
         }
     }
 
-    /// What speaks against the expectations of both pictures being the same up to `tolerance` (relative), at [`SIGNIFICANCE`].
+    /// Evidence against the expectations of both pictures being the same up to `tolerance` (relative), at [`SIGNIFICANCE`].
     pub fn difference(&self, other: &Picture, tolerance: f64) -> Option<String> {
         assert_eq!(self.mean.len(), other.mean.len());
         let tests = 3 * self.mean.len();
@@ -195,7 +195,7 @@ pub fn unbiased() -> impl Iterator<Item = &'static IntegratorSpec> {
     lightsieve::integrators::REGISTRY.iter().copied().filter(|s| s.unbiased && s.name != "importance-caching")
 }
 
-/// Those of [`unbiased`] that sample every pixel by itself. Light tracing alone leaves the pixels of a small or narrow picture to chance, too
+/// The integrators of [`unbiased`] that sample every pixel by itself. Light tracing alone leaves the pixels of a small or narrow picture to chance, too
 /// noisy for tests that look at a pixel after few samples.
 pub fn sampled_by_pixel() -> impl Iterator<Item = &'static IntegratorSpec> {
     unbiased().filter(|s| s.name != "light")

@@ -5,7 +5,7 @@ use super::*;
 /// Names of materials in `usemtl` statements; the last is in no library.
 const MATERIALS: [&str; 4] = ["red", "old brick", "Material #25", "unheard of"];
 
-/// What corners of a file have besides a position.
+/// Attributes of the corners of a file besides the position.
 #[derive(Clone, Copy, Debug)]
 struct Attributes {
     uvs: bool,
