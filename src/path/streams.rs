@@ -3,7 +3,7 @@
 //! A stream is the second argument of [`PathSampler::new`](crate::math::sampler::PathSampler::new) and of
 //! [`HashRng::new`](crate::math::hash::HashRng::new). Bits 32 and above are free for a number that tells sets of one use apart.
 
-/// Eye sub-paths that reach the film.
+/// Eye sub-paths of bidirectional methods.
 pub const EYE: u64 = 1;
 /// Camera rays of auxiliary layers (albedo, normal, depth).
 pub const AUXILIARY: u64 = 2;
@@ -17,9 +17,11 @@ pub const WARM_UP: u64 = 5;
 pub const FIRST_STAGE: u64 = 6;
 /// Which pixels share a light sub-path.
 pub const ASSIGNMENT: u64 = 7;
+/// Paths of the path tracer. They are not the eye sub-paths of bidirectional methods, so that renders of both with one seed are independent.
+pub const PATH: u64 = 8;
 
 /// Every stream with its name.
-pub const ALL: [(&str, u64); 7] = [
+pub const ALL: [(&str, u64); 8] = [
     ("eye", EYE),
     ("auxiliary", AUXILIARY),
     ("light", LIGHT),
@@ -27,6 +29,7 @@ pub const ALL: [(&str, u64); 7] = [
     ("warm-up", WARM_UP),
     ("first stage", FIRST_STAGE),
     ("assignment", ASSIGNMENT),
+    ("path", PATH),
 ];
 
 #[cfg(test)]

@@ -64,7 +64,7 @@ impl PathTracer {
     /// One sample of a pixel, which is number `hooks.pixel` of its tile.
     fn sample(&self, iteration: &Iteration, pixel: (u32, u32), tracer: &mut Tracer, hooks: &mut Gather) {
         let index = iteration.pixel_index(pixel.0, pixel.1);
-        let mut sampler = PathSampler::new(iteration.seed, streams::EYE, index, iteration.index);
+        let mut sampler = PathSampler::new(iteration.seed, streams::PATH, index, iteration.index);
         let start = WalkStart::from_camera(iteration, pixel, &mut sampler).walk;
         let rules = WalkRules { limits: self.limits, mode: Transport::Radiance, directions: &ScatterSampler };
         hooks.normal_before = None;
