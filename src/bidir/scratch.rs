@@ -105,7 +105,7 @@ impl<F: ConnectionFactor> ThreadScratch<F> {
     pub fn new(stride: ProbeStride) -> ThreadScratch<F> {
         ThreadScratch {
             light: LightSubpath::default(),
-            eye: EyeSubpathPdfs::new(),
+            eye: EyeSubpathPdfs::default(),
             queues: EyeQueues {
                 next_event: ShadowQueue::new(RayKind::ShadowDirect),
                 connection: ShadowQueue::new(RayKind::ShadowConnection),

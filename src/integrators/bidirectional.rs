@@ -35,7 +35,7 @@ pub fn resampled_settings(params: &Params, techniques: Techniques) -> BidirSetti
 /// Decides the allocation of a method that draws connections from many light sub-paths, if the parameters ask for it.
 pub fn optimizer(params: &Params) -> Option<AllocationOptimizer> {
     let candidates = || combinations(&[1.0, 0.25, 0.0625, 0.015_625], &[1.0, 0.5, 0.25, 0.125, 0.0625]);
-    (params.choice("allocation") == "auto").then(|| AllocationOptimizer::new(candidates(), RayCosts::SHARED_SUBPATHS))
+    params.is("allocation", "auto").then(|| AllocationOptimizer::new(candidates(), RayCosts::SHARED_SUBPATHS))
 }
 
 impl<S: ConnectionStrategy> Integrator for Bidirectional<S> {

@@ -172,12 +172,13 @@ pub struct EyeSubpathPdfs<F: ConnectionFactor> {
     edges: Vec<F::Edge>,
 }
 
-impl<F: ConnectionFactor> EyeSubpathPdfs<F> {
-    /// Without vertices.
-    pub fn new() -> EyeSubpathPdfs<F> {
+impl<F: ConnectionFactor> Default for EyeSubpathPdfs<F> {
+    fn default() -> EyeSubpathPdfs<F> {
         EyeSubpathPdfs { pdfs: SubpathPdfs::default(), reverse: vec![], edges: vec![] }
     }
+}
 
+impl<F: ConnectionFactor> EyeSubpathPdfs<F> {
     /// Starts over at a lens point of the given density.
     pub fn begin(&mut self, lens: AreaPdf) {
         self.pdfs.begin(lens);

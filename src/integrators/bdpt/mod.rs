@@ -40,7 +40,7 @@ const LIGHT_PATHS: [f32; 3] = [1.0, 0.25, 0.0625];
 const CONNECTIONS: [f32; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 
 fn build(params: &Params) -> Box<dyn Integrator> {
-    let heuristic = if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power };
+    let heuristic = if params.is("heuristic", "balance") { Heuristic::Balance } else { Heuristic::Power };
     let settings = bidirectional::settings(params, params.techniques("techniques"));
     let this = Bidirectional::new(BidirSettings { heuristic, ..settings }, OwnSubpath);
     let candidates = candidates(params);
@@ -53,7 +53,7 @@ fn build(params: &Params) -> Box<dyn Integrator> {
 
 /// The allocations that the parameters allow.
 fn candidates(params: &Params) -> Vec<SampleAllocation> {
-    let full = params.choice("allocation") == "full";
+    let full = params.is("allocation", "full");
     let fractions = |name: &str, all: &[f32]| match params.auto_float(name) {
         Some(fixed) => vec![nearest_power_of_two(fixed)],
         None if full => vec![1.0],

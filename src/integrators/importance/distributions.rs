@@ -32,8 +32,8 @@ pub(super) const UNIFORM: f64 = 0.2;
 /// A pmf that can be the only one beside the uniform one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Distribution {
-    Seen,
-    Open,
+    Visible,
+    Unoccluded,
     Uniform,
 }
 

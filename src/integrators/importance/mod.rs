@@ -53,13 +53,14 @@ const SELECTION: &[ParamSpec] = &[params::SELECTION, params::DISTRIBUTIONS, para
 
 fn scheme(params: &Params) -> SelectionScheme {
     SelectionScheme {
-        selection: if params.choice("selection") == "per-length" { Selection::PerLength } else { Selection::Mixture },
-        only: match params.choice("distributions") {
-            "seen" => Some(Distribution::Seen),
-            "open" => Some(Distribution::Open),
-            "uniform" => Some(Distribution::Uniform),
-            _ => None,
-        },
+        selection: if params.is("selection", "per-length") { Selection::PerLength } else { Selection::Mixture },
+        only: [
+            ("visible", Distribution::Visible),
+            ("unoccluded", Distribution::Unoccluded),
+            ("uniform", Distribution::Uniform),
+        ]
+        .into_iter()
+        .find_map(|(word, distribution)| params.is("distributions", word).then_some(distribution)),
     }
 }
 
@@ -86,8 +87,8 @@ fn build(params: &Params, places: RecordPlaces) -> Box<dyn Integrator> {
             Box::new(Bidirectional::new(common, RecordStrategy::<$factor>::new(settings)).with_optimizer(optimizer))
         };
     }
-    match (params.choice("weights"), settings.scheme.selection) {
-        ("balance", _) => with_factor!(Balance),
+    match (params.is("weights", "balance"), settings.scheme.selection) {
+        (true, _) => with_factor!(Balance),
         (_, Selection::PerLength) => with_factor!(PerLengthFactor),
         _ => with_factor!(RecordMixtureFactor),
     }

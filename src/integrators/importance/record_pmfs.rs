@@ -236,10 +236,10 @@ impl Weights {
             if open <= 0.0 || !open.is_finite() {
                 continue;
             }
-            if wants(Distribution::Open) {
+            if wants(Distribution::Unoccluded) {
                 self.open[at] = open;
             }
-            if wants(Distribution::Seen) {
+            if wants(Distribution::Visible) {
                 light[packet.len] = (at, open);
                 packet.push(&segment(&records.ends[group.start + record], &end));
             }

@@ -9,11 +9,11 @@ pub static SKELETON: IntegratorSpec = IntegratorSpec {
     name: "skeleton",
     aliases: &["skelbpt"],
     short: "Skeleton-based connections (SkelBPT): bidirectional, resampled per room",
-    long: "As `ris`, with probabilities computed at the nodes of a curve skeleton of the empty space, in the middle of rooms and \
-        passages. Finding the node of an eye vertex takes constant time. In large halls it is as good as `two-stage`.\n\n\
-        Noël and Biri 2015, \"Importance sampling using the skeleton of the scene for bidirectional path tracing\". As \
-        published: selection=per-length, weights=balance, connections_per_vertex=1, rr_depth=2, rr_scale=1, allocation=full, \
-        node_acceptance=1.",
+    long: "As `ris`, with probabilities computed at the nodes of a curve skeleton of the empty space, in the middle \
+        of rooms and passages. Finding the node of an eye vertex takes constant time. In large halls it is as good \
+        as `two-stage`.\n\n\
+        Noël and Biri 2015 (SkelBPT). As published: selection=per-length, weights=balance, connections_per_vertex=1, \
+        rr_depth=2, rr_scale=1, allocation=full, node_acceptance=1.",
     params: &[CANDIDATES, &[params::VOXEL_RESOLUTION, params::NODE_ACCEPTANCE], SELECTION],
     unbiased: true,
     limitations: |_| None,

@@ -185,6 +185,17 @@ impl Params {
         }
     }
 
+    /// A choice is this word, which the parameter declares.
+    pub fn is(&self, name: &str, word: &str) -> bool {
+        let spec = self.specs.iter().find(|p| p.name == name);
+        let declares = |c: &Choice| c.name == word;
+        match spec.map(|p| p.default) {
+            // A slip in the program would otherwise never be true.
+            Some(ParamDefault::Choice { choices, .. }) if choices.iter().any(declares) => self.choice(name) == word,
+            _ => panic!("parameter {name} has no choice {word}"),
+        }
+    }
+
     /// A set of techniques.
     pub fn techniques(&self, name: &str) -> Techniques {
         match self.get(name) {

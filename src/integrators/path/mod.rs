@@ -57,7 +57,7 @@ impl PathTracer {
                 rr_scale: 1.0,
             },
             hide_emitters: params.bool("hide_emitters"),
-            heuristic: if params.choice("heuristic") == "balance" { Heuristic::Balance } else { Heuristic::Power },
+            heuristic: if params.is("heuristic", "balance") { Heuristic::Balance } else { Heuristic::Power },
         }
     }
 

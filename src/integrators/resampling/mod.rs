@@ -58,11 +58,15 @@ enum FactorModel {
 
 impl FactorModel {
     fn new(params: &Params) -> FactorModel {
-        match (params.choice("weights"), params.choice("proposal_model")) {
-            ("balance", _) => FactorModel::Balance,
-            (_, "mixture-with-visibility") => FactorModel::MixtureWithVisibility,
-            (_, "per-cache") => FactorModel::PerCache,
-            _ => FactorModel::Mixture,
+        let model = |word| params.is("proposal_model", word);
+        if params.is("weights", "balance") {
+            FactorModel::Balance
+        } else if model("mixture-with-visibility") {
+            FactorModel::MixtureWithVisibility
+        } else if model("per-cache") {
+            FactorModel::PerCache
+        } else {
+            FactorModel::Mixture
         }
     }
 }
@@ -84,12 +88,12 @@ fn build(params: &Params, paths: u32, second_stage: Option<u32>) -> Box<dyn Inte
         cache_fraction: params.float("cache_density"),
         epsilon: params.float("min_density_ratio") as f32,
         min_unseen_fraction: params.float("min_unseen_fraction") as f32,
-        trusted: params.choice("unseen_model") == "constant",
+        trusted: params.is("unseen_model", "constant"),
         // Weights must find the same cache points from whichever side a technique looks at a surface.
-        metric: if params.choice("metric") == "position" || asks_caches { Metric::Plain } else { Metric::Facing },
-        radiance: params.choice("target") == "radiance" && model != FactorModel::PerCache,
+        metric: if params.is("metric", "position") || asks_caches { Metric::Plain } else { Metric::Facing },
+        radiance: params.is("target", "radiance") && model != FactorModel::PerCache,
         per_cache: model == FactorModel::PerCache,
-        two_stage_weights: params.choice("weights") == "two-stage",
+        two_stage_weights: second_stage.is_some() && params.is("weights", "two-stage"),
     };
     let common = bidirectional::resampled_settings(params, params.techniques("techniques"));
     let optimizer = bidirectional::optimizer(params);
