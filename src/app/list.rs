@@ -24,9 +24,9 @@ pub(crate) fn run(args: &ListArgs) -> Result<(), Failure> {
     let spec = find_integrator(name)?;
     out!("{}: {}\n", spec.name, spec.short);
     if args.long {
-        print_descriptions(spec)
+        print_descriptions(spec);
     } else {
-        print_table(spec)
+        print_table(spec);
     }
     Ok(())
 }

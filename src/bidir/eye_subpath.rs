@@ -64,6 +64,7 @@ pub(super) struct EyeHooks<'a, S: ConnectionStrategy, K> {
 }
 
 /// The light's end of a path that a contribution belongs to.
+#[derive(Clone, Copy, Debug)]
 pub(super) enum PathOrigin {
     /// It is known.
     Known(Option<Origin>),

@@ -172,7 +172,7 @@ fn encode(contents: &ContentsRef, file: &mut dyn Write) -> std::io::Result<()> {
         // postcard does not say why a write failed.
         return Err(out.get_mut().error.take().unwrap_or_else(|| std::io::Error::other(e)));
     }
-    let Checksummed { file, checksum, .. } = out.into_inner().map_err(|e| e.into_error())?;
+    let Checksummed { file, checksum, .. } = out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
     file.write_all(&checksum.finalize().to_le_bytes())
 }
 

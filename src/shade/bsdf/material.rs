@@ -115,13 +115,14 @@ impl MaterialSet {
         let mut materials = Vec::with_capacity(descs.len());
         for (i, desc) in descs.iter().enumerate() {
             let tree = Builder::new(descs, textures).material(BsdfId(i as u32));
-            materials.push(tree.map(Material::new).unwrap_or_else(|error| {
+            let report = |error| {
                 let name =
                     desc.name.as_deref().map_or_else(|| format!("material {i}"), |n| format!("material \"{n}\""));
                 let message = format!("{name}: {error}");
                 diagnostics.push(Diagnostic::error("scene::material", message).at(desc.span.clone()));
                 Material::default_material()
-            }));
+            };
+            materials.push(tree.map_or_else(report, Material::new));
         }
         MaterialSet { materials, default: Material::default_material() }
     }

@@ -191,10 +191,10 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     let orange = || DiffuseParams { reflectance: rgb(0.8, 0.4, 0.1) };
     let tints = (rgb(0.9, 0.8, 0.7), rgb(0.5, 0.6, 0.9));
     let glass = |roughness, eta, (specular_reflectance, specular_transmittance)| RoughDielectricParams {
-        roughness,
-        eta,
         specular_reflectance,
         specular_transmittance,
+        roughness,
+        eta,
     };
     let brown = rgb(0.6, 0.3, 0.1);
     let diffuse = z.name("diffuse", orange());
