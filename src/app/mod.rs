@@ -89,13 +89,7 @@ impl From<JobError> for Failure {
 
 /// Runs the program; the exit code tells how it ended.
 pub fn main() -> ExitCode {
-    let missing = processor::missing_instruction_sets();
-    if !missing.is_empty() {
-        note!(
-            "error: this program was compiled for processors with {}, which this one lacks; build it on this machine with \
-             RUSTFLAGS=\"-C target-cpu=native\" cargo build --release",
-            missing.join(", ")
-        );
+    if processor::reports_missing_instruction_sets() {
         return ExitCode::from(2);
     }
     parse_and_run()
