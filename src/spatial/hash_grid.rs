@@ -40,8 +40,9 @@ pub struct HashGrid {
     /// First point of each bucket, and the number of all.
     starts: Vec<u32>,
     points: Vec<GridPoint>,
-    /// Points half sorted, while the grid is built; kept for its memory.
-    half_sorted: Vec<GridPoint>,
+    /// Bucket of each point, and points sorted by part of the table, while the grid is built; kept for their memory.
+    point_buckets: Vec<u32>,
+    half_sorted: Vec<HashedPoint>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -49,6 +50,12 @@ struct GridPoint {
     p: Vec3,
     /// Number of the point in the list that the grid was built from.
     index: u32,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct HashedPoint {
+    bucket: u32,
+    point: GridPoint,
 }
 
 impl HashGrid {
@@ -71,7 +78,7 @@ impl HashGrid {
         self.bits = buckets.ilog2();
         self.starts.resize(buckets + 1, 0);
         self.points.resize(positions.len(), GridPoint::default());
-        self.half_sorted.resize(positions.len(), GridPoint::default());
+        self.half_sorted.resize(positions.len(), HashedPoint::default());
         self.sort(positions, buckets.min(MAX_PARTS));
     }
 
@@ -156,15 +163,17 @@ impl HashGrid {
     }
 
     #[inline]
-    fn bucket(&self, p: Vec3) -> usize {
-        let [x, y, z] = [0, 1, 2].map(|axis| self.cell(p[axis], axis));
-        (self.bucket_of_row(y, z).wrapping_add(x as usize)) & ((1 << self.bits) - 1)
+    fn bucket(&self, p: Vec3) -> u32 {
+        let (x, y, z) = (self.cell(p.x, 0), self.cell(p.y, 1), self.cell(p.z, 2));
+        (self.bucket_of_row(y, z).wrapping_add(x as usize) & ((1 << self.bits) - 1)) as u32
     }
 
     /// Sorts the points by bucket, in two stable passes: into `parts` runs of buckets, and inside of each.
     fn sort(&mut self, positions: &[Vec3], parts: usize) {
-        let mut half_sorted = std::mem::take(&mut self.half_sorted);
-        let sizes = self.distribute(positions, parts, &mut half_sorted);
+        let (mut point_buckets, mut half_sorted) =
+            (std::mem::take(&mut self.point_buckets), std::mem::take(&mut self.half_sorted));
+        positions.par_iter().map(|&p| self.bucket(p)).collect_into_vec(&mut point_buckets);
+        let sizes = self.distribute(positions, &point_buckets, parts, &mut half_sorted);
         let (mut points, mut starts) = (std::mem::take(&mut self.points), std::mem::take(&mut self.starts));
         let buckets = (1 << self.bits) / parts;
         let mut runs = Vec::with_capacity(parts);
@@ -178,24 +187,24 @@ impl HashGrid {
             runs.push(Run { from: own, to: own_to, starts, first });
             first += own.len() as u32;
         }
-        runs.into_par_iter().for_each(|run| run.sort(|p| self.bucket(p) & (buckets - 1)));
+        runs.into_par_iter().for_each(Run::sort);
         starts[buckets * parts] = positions.len() as u32;
-        (self.points, self.starts, self.half_sorted) = (points, starts, half_sorted);
+        (self.points, self.starts) = (points, starts);
+        (self.point_buckets, self.half_sorted) = (point_buckets, half_sorted);
     }
 
     /// Writes all points to `to`, sorted by the part of the table that their bucket belongs to, and returns the number
     /// of points of each part.
-    fn distribute(&self, positions: &[Vec3], parts: usize, to: &mut [GridPoint]) -> Vec<usize> {
+    fn distribute(&self, positions: &[Vec3], buckets: &[u32], parts: usize, to: &mut [HashedPoint]) -> Vec<usize> {
         let shift = self.bits - parts.ilog2();
-        let part_of = |p: Vec3| self.bucket(p) >> shift;
-        let count = |chunk: &[Vec3]| {
+        let count = |chunk: &[u32]| {
             let mut counts = vec![0usize; parts];
-            chunk.iter().for_each(|&p| counts[part_of(p)] += 1);
+            chunk.iter().for_each(|&bucket| counts[(bucket >> shift) as usize] += 1);
             counts
         };
-        let counts: Vec<Vec<usize>> = positions.par_chunks(CHUNK).map(count).collect();
+        let counts: Vec<Vec<usize>> = buckets.par_chunks(CHUNK).map(count).collect();
         // For each chunk, where its points of each part go: parts follow one another, and in each part the chunks.
-        let mut targets: Vec<Vec<&mut [GridPoint]>> = counts.iter().map(|_| Vec::with_capacity(parts)).collect();
+        let mut targets: Vec<Vec<&mut [HashedPoint]>> = counts.iter().map(|_| Vec::with_capacity(parts)).collect();
         let mut rest = to;
         for part in 0..parts {
             for (targets, counts) in targets.iter_mut().zip(&counts) {
@@ -204,13 +213,14 @@ impl HashGrid {
                 rest = after;
             }
         }
-        positions.par_chunks(CHUNK).zip(targets).enumerate().for_each(|(number, (chunk, mut targets))| {
-            for (i, &p) in chunk.iter().enumerate() {
-                let target = &mut targets[part_of(p)];
-                if let Some((next, rest)) = std::mem::take(target).split_first_mut() {
-                    *next = GridPoint { p, index: (number * CHUNK + i) as u32 };
-                    *target = rest;
-                }
+        let chunks = positions.par_chunks(CHUNK).zip(buckets.par_chunks(CHUNK)).zip(targets).enumerate();
+        chunks.for_each(|(number, ((positions, buckets), mut targets))| {
+            let mut written = vec![0u32; parts];
+            for (i, (&p, &bucket)) in positions.iter().zip(buckets).enumerate() {
+                let part = (bucket >> shift) as usize;
+                let point = GridPoint { p, index: (number * CHUNK + i) as u32 };
+                targets[part][written[part] as usize] = HashedPoint { bucket, point };
+                written[part] += 1;
             }
         });
         (0..parts).map(|part| counts.iter().map(|counts| counts[part]).sum()).collect()
@@ -219,7 +229,7 @@ impl HashGrid {
 
 /// Points of one part of the table, to be sorted by bucket.
 struct Run<'a> {
-    from: &'a [GridPoint],
+    from: &'a [HashedPoint],
     to: &'a mut [GridPoint],
     /// First point of each of its buckets.
     starts: &'a mut [u32],
@@ -228,17 +238,19 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// A counting sort; `bucket` numbers the buckets of this part from 0.
-    fn sort(self, bucket: impl Fn(Vec3) -> usize) {
+    /// A counting sort.
+    fn sort(self) {
+        // Parts have a power of two of buckets.
+        let mask = self.starts.len() as u32 - 1;
         self.starts.fill(0);
-        self.from.iter().for_each(|point| self.starts[bucket(point.p)] += 1);
+        self.from.iter().for_each(|hashed| self.starts[(hashed.bucket & mask) as usize] += 1);
         let mut sum = 0;
         for start in self.starts.iter_mut() {
             sum += std::mem::replace(start, sum);
         }
-        for point in self.from {
-            let next = &mut self.starts[bucket(point.p)];
-            self.to[*next as usize] = *point;
+        for hashed in self.from {
+            let next = &mut self.starts[(hashed.bucket & mask) as usize];
+            self.to[*next as usize] = hashed.point;
             *next += 1;
         }
         // Every start has moved to the end of its bucket, which is where the next one starts.
