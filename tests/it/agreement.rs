@@ -46,7 +46,7 @@ fn the_path_tracer_agrees_with_mitsuba() {
     for name in GALLERY {
         // Balls and tubes are triangles here and formulas there.
         let tolerance = if ["glass", "normals", "principled"].contains(&name) { 0.01 } else { 0.0 };
-        let ours = Picture::render(&path::SPEC, &prepared(exhibit(name)), &[], SPP, 1);
+        let ours = Picture::render(&path::SPEC, &prepared(exhibit(name)), &[], SPP, 2);
         ours.assert_agrees(&mitsuba(name), tolerance, name);
     }
 }

@@ -2,7 +2,7 @@
 //! the cache points around (probabilistic connections, Popov et al. 2015; resampling-aware weights, Nabata et al. 2020; two-stage
 //! resampling, Nabata et al. 2020).
 //!
-//! [`strategy`] draws, [`pmfs`] and [`cache_points`] hold the probabilities, [`models`] tells weights what they know.
+//! `strategy` draws, `pmfs` and `cache_points` hold the probabilities, `models` tells weights what they know.
 
 mod cache_points;
 mod models;

@@ -6,7 +6,7 @@
 //! source; the probability of any source is the product along its own path, which is stored as bits.
 //!
 //! The walk ends early at a cluster of sources that face nearly one way and are seen under a small angle
-//! ([`WideNode::treat_as_single`]): one of its sources is drawn by power. A finely tessellated emitter then costs a few
+//! (`WideNode::treat_as_single`): one of its sources is drawn by power. A finely tessellated emitter then costs a few
 //! levels, not all of them.
 
 use super::bounds::{LightBounds, Power};
