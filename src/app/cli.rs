@@ -129,7 +129,7 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub aov: Vec<String>,
     /// Also write the picture of every technique, raw and weighted, to this folder (bidirectional integrators)
-    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+    #[arg(long, value_name = "DIR")]
     pub pyramid: Option<PathBuf>,
     /// Longest paths of the pyramid, in edges
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u64).range(1..=32))]

@@ -342,9 +342,9 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         self.strategy.note().into_iter().chain(optimizer).collect()
     }
 
-    /// Starts to keep a picture of every technique.
-    pub fn keep_pyramid(&mut self, window: [u32; 4], max_edges: usize) {
-        self.pyramid = Some(Pyramid::new(window, max_edges));
+    /// Adds the picture of every technique to `pyramid`.
+    pub fn keep_pyramid(&mut self, pyramid: Pyramid) {
+        self.pyramid = Some(pyramid);
     }
 
     /// The pictures of all techniques.

@@ -37,7 +37,7 @@ pub use allocation::{AllocationOptimizer, RayCosts};
 pub use engine::{BidirSettings, Bidirectional};
 pub use light_subpath::LightSubpath;
 pub use replay::{ContributionRecord, Replay};
-pub use store::VertexStore;
+pub use store::{VertexCount, VertexStore};
 pub use strategy::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, NoConnections};
 pub use vertex::LightVertex;
 pub use warm_up::WarmUp;

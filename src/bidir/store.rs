@@ -9,6 +9,7 @@ use crate::shade::{BsdfPool, BsdfView};
 use crate::spatial::light_tree::WeightedPoint;
 use crate::spatial::{VplTree, morton};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Light sub-paths, cut at every vertex that can be connected to.
 #[derive(Debug, Default)]
@@ -59,6 +60,28 @@ struct StoredVertex {
     chunk: u16,
     /// c_0 = 1.
     can_be_hit: bool,
+}
+
+/// Stored light vertices and the sub-paths that they come from, summed over stores.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct VertexCount {
+    /// Vertices.
+    pub vertices: u64,
+    /// Sub-paths, those that ended at once included.
+    pub paths: u64,
+}
+
+impl VertexCount {
+    /// Counts what a store has.
+    pub fn add(&mut self, store: &VertexStore) {
+        self.vertices += store.len() as u64;
+        self.paths += u64::from(store.paths_traced);
+    }
+
+    /// L, an estimate of the mean number of stored vertices of a light sub-path; 0 if nothing is known yet.
+    pub fn vertices_per_path(&self) -> f64 {
+        if self.paths > 0 { self.vertices as f64 / self.paths as f64 } else { 0.0 }
+    }
 }
 
 impl VertexStore {

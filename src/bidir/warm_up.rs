@@ -25,6 +25,11 @@ pub struct WarmUp<'a> {
 }
 
 impl WarmUp<'_> {
+    /// Sets of light sub-paths from which strategies estimate normalisations.
+    pub const SETS: u64 = 4;
+    /// Light sub-paths of one of these sets, at most.
+    pub const MAX_PATHS: u32 = 4000;
+
     /// Traces `paths` light sub-paths; `set` tells one set from another.
     pub fn light_vertices(&self, paths: u32, set: u64, with_tree: bool) -> (VertexStore, RayStats) {
         let iteration = &self.iteration;

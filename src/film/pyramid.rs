@@ -2,9 +2,10 @@
 //! − s) the picture that the technique makes by itself (raw), and what its weights leave of it.
 
 use crate::math::Rgb;
+use serde::{Deserialize, Serialize};
 
 /// One picture per technique, of a part of the film.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Pyramid {
     window: [u32; 4],
     max_edges: usize,
@@ -64,6 +65,14 @@ impl Pyramid {
         for (sums, more) in self.sums.iter_mut().flatten().zip(other.sums.iter().flatten()) {
             sums.as_flattened_mut().iter_mut().zip(more.as_flattened()).for_each(|(a, b)| *a += b);
         }
+    }
+
+    /// The pyramid is of this window and these path lengths, and has a sum for every pixel.
+    pub fn is_of(&self, window: [u32; 4], max_edges: usize) -> bool {
+        let pixels = window[2] as usize * window[3] as usize;
+        let techniques = Pyramid::number(max_edges + 1, 0);
+        let whole = self.sums.len() == techniques && self.sums.as_flattened().iter().all(|p| p.len() == pixels);
+        self.window == window && self.max_edges == max_edges && whole
     }
 
     /// Width and height in pixels.

@@ -55,8 +55,8 @@ impl<S: ConnectionStrategy> Integrator for Bidirectional<S> {
         Bidirectional::notes(self)
     }
 
-    fn keep_pyramid(&mut self, window: [u32; 4], max_edges: usize) -> bool {
-        Bidirectional::keep_pyramid(self, window, max_edges);
+    fn keep_pyramid(&mut self, pyramid: Pyramid) -> bool {
+        Bidirectional::keep_pyramid(self, pyramid);
         true
     }
 

@@ -86,12 +86,13 @@ pub trait Integrator: Send {
         vec![]
     }
 
-    /// Starts to keep a picture of every technique, for paths of up to `max_edges` edges; false if there are no techniques to tell apart.
-    fn keep_pyramid(&mut self, _window: [u32; 4], _max_edges: usize) -> bool {
+    /// Adds the picture of every technique to `pyramid`, which is empty or of the iterations so far; false if there are no techniques to tell
+    /// apart.
+    fn keep_pyramid(&mut self, _pyramid: Pyramid) -> bool {
         false
     }
 
-    /// The pictures of techniques that have been kept since.
+    /// The pictures of techniques, if they are kept.
     fn pyramid(&self) -> Option<&Pyramid> {
         None
     }

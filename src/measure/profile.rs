@@ -269,7 +269,7 @@ impl RayQuery for NoBackend {
     fn closest(&self, _: &crate::ray::Ray) -> Option<crate::ray::Hit> {
         None
     }
-    fn occluded(&self, _: &crate::ray::Ray) -> bool {
+    fn occluded(&self, _: &crate::ray::Ray, _: crate::ray::SurfaceMask) -> bool {
         false
     }
 }

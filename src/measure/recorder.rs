@@ -1,7 +1,7 @@
 //! A backend that records its queries, so that the very same queries can be sent through bare backends afterwards,
 //! with nothing of a renderer around them.
 
-use crate::ray::{Hit, Ray, RayQuery, SegmentPacket};
+use crate::ray::{Hit, Ray, RayQuery, SegmentPacket, SurfaceMask};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -21,7 +21,7 @@ struct Log {
 #[derive(Clone, Copy)]
 enum QueryKind {
     Closest,
-    Occluded,
+    Occluded(SurfaceMask),
     Packet,
 }
 
@@ -53,8 +53,8 @@ impl RayQuery for Arc<dyn RayQuery> {
         (**self).closest(ray)
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
-        (**self).occluded(ray)
+    fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
+        (**self).occluded(ray, blockers)
     }
 
     fn occluded_packet(&self, packet: &SegmentPacket) -> (u16, u32) {
@@ -97,12 +97,12 @@ impl RayQuery for Recorder {
         self.inner.closest(ray)
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
+    fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
         self.keep(1, |log| {
-            log.order.push(QueryKind::Occluded);
+            log.order.push(QueryKind::Occluded(blockers));
             log.rays.push(*ray);
         });
-        self.inner.occluded(ray)
+        self.inner.occluded(ray, blockers)
     }
 
     fn occluded_packet(&self, packet: &SegmentPacket) -> (u16, u32) {
@@ -143,7 +143,7 @@ impl Recording {
                 met += match kind {
                     QueryKind::Packet => packets.next().map_or(0, |p| query.occluded_packet(p).0.count_ones().into()),
                     QueryKind::Closest => rays.next().map_or(0, |r| u64::from(query.closest(r).is_some())),
-                    QueryKind::Occluded => rays.next().map_or(0, |r| u64::from(query.occluded(r))),
+                    QueryKind::Occluded(blockers) => rays.next().map_or(0, |r| u64::from(query.occluded(r, *blockers))),
                 };
             }
             met

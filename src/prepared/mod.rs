@@ -6,7 +6,9 @@
 
 pub mod build;
 pub mod features;
+mod lights;
 pub mod mesh;
+mod placing;
 pub mod triangles;
 
 pub use build::{PrepareError, PrepareOptions};

@@ -1,6 +1,6 @@
 //! Do two backends give the same answers? Counted on random rays, so that every disagreement is seen and can be explained.
 
-use super::{Ray, RayQuery, Segment, SegmentPacket};
+use super::{Ray, RayQuery, Segment, SegmentPacket, SurfaceMask};
 use crate::math::{Vec3, hash::HashRng, warp};
 
 /// Relative difference of distances that rounding explains for rays that are not grazing.
@@ -71,17 +71,22 @@ pub fn compare(a: &dyn RayQuery, b: &dyn RayQuery, bounds: (Vec3, Vec3), count: 
             continue;
         }
         out.segments += 1;
-        let blocked = (a.occluded(&segment.ray()), b.occluded(&segment.ray()));
-        out.occlusion += u64::from(blocked.0 != blocked.1);
+        for mask in [SurfaceMask::ALL, SurfaceMask::BLOCKERS, SurfaceMask::INTERFACES] {
+            let blocked = [a, b].map(|query| query.occluded(&segment.ray(), mask));
+            out.occlusion += u64::from(blocked[0] != blocked[1]);
+        }
         packet.push(&segment);
         if packet.len == super::PACKET {
             for query in [a, b] {
                 let (mask, _) = query.occluded_packet(&packet);
                 for i in 0..packet.len {
-                    out.packet += u64::from((mask >> i & 1 == 1) != query.occluded(&packet.get(i).ray()));
+                    out.packet +=
+                        u64::from((mask >> i & 1 == 1) != query.occluded(&packet.get(i).ray(), packet.blockers));
                 }
             }
             packet.len = 0;
+            packet.blockers =
+                if packet.blockers == SurfaceMask::ALL { SurfaceMask::BLOCKERS } else { SurfaceMask::ALL };
         }
     }
     out
@@ -110,7 +115,7 @@ mod tests {
             }
         }
         let triangles = (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        MeshBuffers { positions: VertexBuffer::new(positions), triangles }
+        MeshBuffers { positions: VertexBuffer::new(positions), triangles, surface: SurfaceMask::BLOCKERS }
     }
 
     fn backends() -> Vec<Backend> {
@@ -132,6 +137,20 @@ mod tests {
             assert!(a.disagreement() <= tolerated, "{backend:?} {a:?}");
             assert_eq!(a.packet, 0, "{backend:?}: packets and single rays must agree");
         }
+    }
+
+    /// Two soups, of which one is an interface, in the world and in instances.
+    #[test]
+    fn interfaces_are_told_apart_from_blockers() {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| soup(100, 1.0, Vec3::splat(0.1 * i as f32), 30 + i));
+        let interface = |mesh: MeshBuffers| MeshBuffers { surface: SurfaceMask::INTERFACES, ..mesh };
+        let geometry = Geometry {
+            meshes: vec![a, interface(b), interface(c), d],
+            world: vec![0, 1],
+            groups: vec![vec![2, 3]],
+            instances: vec![Instance { group: 0, to_world: Affine3A::from_translation(Vec3::X) }],
+        };
+        check(geometry, 2e-3);
     }
 
     #[test]
@@ -186,7 +205,7 @@ mod tests {
                 let (mask, invalid) = query.occluded_packet(&packet);
                 assert_eq!(invalid, 0);
                 for (k, &origin) in origins.iter().enumerate() {
-                    let single = query.occluded(&Segment::between(origin, target).ray());
+                    let single = query.occluded(&Segment::between(origin, target).ray(), packet.blockers);
                     assert_eq!(mask >> k & 1 == 1, single);
                 }
             }
@@ -200,7 +219,8 @@ mod tests {
         let quads = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
         let triangles: Vec<[u32; 3]> =
             quads.iter().flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
-        let mesh = MeshBuffers { positions: VertexBuffer::new((0..8).map(corner).collect()), triangles };
+        let positions = VertexBuffer::new((0..8).map(corner).collect());
+        let mesh = MeshBuffers { positions, triangles, surface: SurfaceMask::BLOCKERS };
         let geometry = Arc::new(Geometry { meshes: vec![mesh], world: vec![0], ..Geometry::default() });
         for backend in backends() {
             let query = backend.build(geometry.clone(), 1).unwrap();

@@ -1,7 +1,7 @@
 //! The oracle: every triangle against every ray, in double precision. Slow on purpose; nothing here is approximate but f64 itself.
 
 use super::geometry::Geometry;
-use super::{Hit, Ray, RayQuery};
+use super::{Hit, Ray, RayQuery, SurfaceMask};
 use glam::DVec3;
 
 struct Triangle {
@@ -9,6 +9,7 @@ struct Triangle {
     triangle: u32,
     mesh: u32,
     instance: u32,
+    surface: SurfaceMask,
 }
 
 /// All triangles in world space.
@@ -35,7 +36,7 @@ impl BruteScene {
                     }
                     None => p.as_dvec3(),
                 });
-                triangles.push(Triangle { corners, triangle, mesh, instance });
+                triangles.push(Triangle { corners, triangle, mesh, instance, surface: buffers.surface });
             }
         });
         BruteScene { triangles }
@@ -86,9 +87,10 @@ impl RayQuery for BruteScene {
         best
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
+    fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
         let inside = f64::from(ray.t_min)..f64::from(ray.t_max);
-        self.triangles.iter().any(|tri| intersect(&tri.corners, o, d).is_some_and(|(t, ..)| inside.contains(&t)))
+        let met = |tri: &Triangle| intersect(&tri.corners, o, d).is_some_and(|(t, ..)| inside.contains(&t));
+        self.triangles.iter().any(|tri| tri.surface.intersects(blockers) && met(tri))
     }
 }

@@ -6,7 +6,7 @@
 #![allow(unsafe_code)]
 
 use super::geometry::Geometry;
-use super::{Hit, NONE, PACKET, QueryError, Ray, RayQuery, SegmentPacket, T_MIN};
+use super::{Hit, NONE, PACKET, QueryError, Ray, RayQuery, SegmentPacket, SurfaceMask, T_MIN};
 use glam::Vec4;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::sync::{Arc, Mutex};
@@ -266,8 +266,7 @@ fn attach_mesh(device: &Device, scene: &SceneHandle, geometry: &Geometry, mesh: 
             12,
             buffers.triangles.len(),
         );
-        // Embree 4's default mask is 1, Embree 3's is all ones.
-        rtcSetGeometryMask(handle, u32::MAX);
+        rtcSetGeometryMask(handle, buffers.surface.bits());
         rtcCommitGeometry(handle);
         rtcAttachGeometryByID(scene.0, handle, id);
         rtcReleaseGeometry(handle);
@@ -290,6 +289,7 @@ fn attach_instance(
         rtcSetGeometryInstancedScene(handle, group.0);
         rtcSetGeometryTimeStepCount(handle, 1);
         rtcSetGeometryTransform(handle, 0, RTCFormat::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.as_ptr().cast());
+        // The meshes of the group have masks of their own. Embree 4's default mask is 1, Embree 3's is all ones.
         rtcSetGeometryMask(handle, u32::MAX);
         rtcCommitGeometry(handle);
         rtcAttachGeometryByID(scene.0, handle, id);
@@ -325,13 +325,13 @@ struct RayHitRows {
 }
 
 #[inline(always)]
-fn raw_ray(ray: &Ray) -> RayRows {
+fn raw_ray(ray: &Ray, surfaces: SurfaceMask) -> RayRows {
     debug_assert!(ray.is_valid());
     RayRows {
         o_near: ray.o.extend(ray.t_min),
         d_time: ray.d.extend(0.0),
         t_far: ray.t_max,
-        mask: u32::MAX,
+        mask: surfaces.bits(),
         id: 0,
         flags: 0,
     }
@@ -341,7 +341,7 @@ impl EmbreeScene {
     /// [`RayQuery::closest`], for callers that know the backend.
     #[inline(always)]
     pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut rows = RayHitRows { ray: raw_ray(ray), hit: RTCHit::default() };
+        let mut rows = RayHitRows { ray: raw_ray(ray, SurfaceMask::ALL), hit: RTCHit::default() };
         rows.hit.geomID = u32::MAX;
         rows.hit.instID = [u32::MAX];
         // SAFETY: the scene is committed and alive, the ray is valid (checked by the caller, see `Ray::is_valid`). Both types are
@@ -392,8 +392,8 @@ impl RayQuery for EmbreeScene {
         self.first_hit(ray)
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
-        let mut rows = raw_ray(ray);
+    fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
+        let mut rows = raw_ray(ray, blockers);
         // SAFETY: as in `first_hit`.
         unsafe { version::occluded1(self.top.0, &mut *(&raw mut rows).cast::<RTCRay>()) };
         // Embree sets tfar to −∞ when something is in the way.
@@ -411,7 +411,7 @@ impl RayQuery for EmbreeScene {
             dir_z: packet.d[2],
             time: [0.0; PACKET],
             tfar: packet.t_max,
-            mask: [u32::MAX; PACKET],
+            mask: [packet.blockers.bits(); PACKET],
             id: [0; PACKET],
             flags: [0; PACKET],
         };
@@ -455,6 +455,7 @@ mod tests {
         let mesh = MeshBuffers {
             positions: VertexBuffer::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y]),
             triangles: vec![[0, 1, 2]],
+            surface: SurfaceMask::BLOCKERS,
         };
         Arc::new(Geometry { meshes: vec![mesh], world: vec![0], ..Geometry::default() })
     }

@@ -27,9 +27,36 @@ impl Deref for VertexBuffer {
     }
 }
 
+/// A set of kinds of surfaces, told apart by what they do to light on a straight segment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SurfaceMask(u32);
+
+impl SurfaceMask {
+    /// Surfaces that scatter or absorb light, wholly or in part.
+    pub const BLOCKERS: SurfaceMask = SurfaceMask(1);
+    /// Surfaces that light passes unchanged and in its direction: `null` materials, which bound media and nothing else.
+    pub const INTERFACES: SurfaceMask = SurfaceMask(2);
+    /// All surfaces.
+    pub const ALL: SurfaceMask = SurfaceMask(3);
+
+    /// The bits.
+    #[inline]
+    pub fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// The sets have a kind in common.
+    #[inline]
+    pub fn intersects(self, other: SurfaceMask) -> bool {
+        self.0 & other.0 != 0
+    }
+}
+
 /// One mesh.
 #[derive(Debug)]
 pub struct MeshBuffers {
+    /// The kind of its surface.
+    pub surface: SurfaceMask,
     /// Vertices, all finite.
     pub positions: VertexBuffer,
     /// Vertex indices, all in range.

@@ -18,7 +18,7 @@ pub mod offset;
 pub mod phases;
 pub mod tracer;
 
-pub use geometry::{Geometry, Instance, MeshBuffers, VertexBuffer};
+pub use geometry::{Geometry, Instance, MeshBuffers, SurfaceMask, VertexBuffer};
 pub use phases::Phases;
 pub use tracer::{RayKind, RayStats, Tracer, Work};
 
@@ -120,11 +120,19 @@ pub struct SegmentPacket {
     pub t_max: [f32; PACKET],
     /// Segments in use.
     pub len: usize,
+    /// Surfaces that can be in the way of the segments.
+    pub blockers: SurfaceMask,
 }
 
 impl Default for SegmentPacket {
     fn default() -> Self {
-        SegmentPacket { o: [[0.0; PACKET]; 3], d: [[0.0; PACKET]; 3], t_max: [0.0; PACKET], len: 0 }
+        SegmentPacket {
+            o: [[0.0; PACKET]; 3],
+            d: [[0.0; PACKET]; 3],
+            t_max: [0.0; PACKET],
+            len: 0,
+            blockers: SurfaceMask::ALL,
+        }
     }
 }
 
@@ -165,10 +173,10 @@ pub trait RayQuery: Send + Sync {
     /// The first thing the ray meets. The ray must be valid ([`Ray::is_valid`]).
     fn closest(&self, ray: &Ray) -> Option<Hit>;
 
-    /// Is anything in the ray's interval? The ray must be valid.
-    fn occluded(&self, ray: &Ray) -> bool;
+    /// Is a surface of the kinds `blockers` in the ray's interval? The ray must be valid.
+    fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool;
 
-    /// Bit `i` set: segment `i` of the packet is blocked. Segments that are not valid are reported blocked, with their number in
+    /// Bit `i` set: segment `i` of the packet is blocked by a surface of the kinds that the packet asks for. Segments that are not valid are reported blocked, with their number in
     /// the second value.
     fn occluded_packet(&self, packet: &SegmentPacket) -> (u16, u32) {
         let (mut mask, mut invalid) = (0, 0);
@@ -176,7 +184,7 @@ pub trait RayQuery: Send + Sync {
             let ray = packet.get(i).ray();
             let valid = ray.is_valid();
             invalid += u32::from(!valid);
-            if !valid || self.occluded(&ray) {
+            if !valid || self.occluded(&ray, packet.blockers) {
                 mask |= 1 << i;
             }
         }
@@ -235,7 +243,7 @@ mod tests {
         assert_eq!(size_of::<Ray>(), 32);
         assert_eq!(size_of::<Hit>(), 24);
         assert_eq!(size_of::<Segment>(), 28);
-        // Seven lines of sixteen floats, and the number of segments.
+        // Seven lines of sixteen floats; the number of segments and the mask.
         assert_eq!(size_of::<SegmentPacket>(), 8 * 64);
     }
 }

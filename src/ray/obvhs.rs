@@ -6,7 +6,7 @@
 //! ray through a shared edge never slips between two triangles. Instances are flattened.
 
 use super::geometry::Geometry;
-use super::{Hit, QueryError, Ray, RayQuery};
+use super::{Hit, QueryError, Ray, RayQuery, SurfaceMask};
 use crate::math::Vec3;
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -30,10 +30,12 @@ impl Boundable for Corners {
     }
 }
 
+#[derive(Clone, Copy)]
 struct Identity {
     triangle: u32,
     mesh: u32,
     instance: u32,
+    surface: SurfaceMask,
 }
 
 /// A flattened scene.
@@ -68,7 +70,7 @@ impl ObvhsScene {
             for triangle in 0..buffers.triangles.len() as u32 {
                 let placed = buffers.corners(triangle).map(|p| to_world.map_or(p, |m| m.transform_point3(p)));
                 corners.push(Corners(placed.map(|p| Vec3A::from((p - centre) * scale))));
-                identities.push(Identity { triangle, mesh, instance });
+                identities.push(Identity { triangle, mesh, instance, surface: buffers.surface });
             }
         });
         if corners.is_empty() {
@@ -79,13 +81,7 @@ impl ObvhsScene {
         // Triangles in leaf order: no look-up between the leaf and its triangle.
         let order = std::mem::take(&mut tree.primitive_indices);
         let ordered = order.iter().map(|&i| Corners(corners[i as usize].0)).collect();
-        let identities = order
-            .iter()
-            .map(|&i| {
-                let Identity { triangle, mesh, instance } = identities[i as usize];
-                Identity { triangle, mesh, instance }
-            })
-            .collect();
+        let identities = order.iter().map(|&i| identities[i as usize]).collect();
         Ok(ObvhsScene { tree: Some(tree), corners: ordered, identities, centre, scale })
     }
 
@@ -151,14 +147,17 @@ impl RayQuery for ObvhsScene {
         });
         found.then(|| {
             let id = &self.identities[hit.primitive_id as usize];
-            let Identity { triangle, mesh, instance } = *id;
+            let Identity { triangle, mesh, instance, .. } = *id;
             Hit { t: hit.t / length, u: best.0, v: best.1, triangle, mesh, instance }
         })
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
+    fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
         let Some(tree) = &self.tree else { return false };
         let Some((inner, _)) = self.enter(ray) else { return false };
-        !tree.ray_traverse_miss(inner, |ray, id| intersect(&self.corners[id], ray).map_or(f32::INFINITY, |(t, ..)| t))
+        !tree.ray_traverse_miss(inner, |ray, id| match intersect(&self.corners[id], ray) {
+            Some((t, ..)) if self.identities[id].surface.intersects(blockers) => t,
+            _ => f32::INFINITY,
+        })
     }
 }

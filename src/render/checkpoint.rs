@@ -8,7 +8,7 @@
 
 use super::scene_hash::scene_hash;
 use super::{Estimator, Plan};
-use crate::film::Film;
+use crate::film::{Film, Pyramid};
 use crate::image::atomic_write;
 use crate::prepared::PreparedScene;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// Beginning of every checkpoint; the version follows.
 const NAME: &str = "lightsieve-checkpoint-";
 /// Version of the format.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Bytes at the beginning of a file that are searched for [`NAME`]: version 2 had it behind a bracket and a key.
 const HEAD: usize = 64;
 /// Bytes of the checksum.
@@ -32,6 +32,8 @@ pub struct RenderIdentity {
     seed: u64,
     /// The render has two halves with seeds of their own, see [`super::error_target`].
     error_target: bool,
+    /// Edges of the longest paths of the pyramid, if one is kept.
+    pyramid_edges: Option<usize>,
     film_size: [u32; 2],
     window: [u32; 4],
     scene_hash: u64,
@@ -45,6 +47,8 @@ pub struct SavedEstimator {
     pub film: Film,
     /// State of the integrator, see [`crate::integrators::Integrator::state`].
     pub state: Vec<u8>,
+    /// Pictures of techniques, if the render keeps them.
+    pub pyramid: Option<Pyramid>,
 }
 
 /// Contents of a file, as it is read.
@@ -66,6 +70,7 @@ struct ContentsRef<'a> {
 struct EstimatorRef<'a> {
     film: &'a Film,
     state: Vec<u8>,
+    pyramid: Option<&'a Pyramid>,
 }
 
 /// A checkpoint that cannot be used or written.
@@ -106,6 +111,7 @@ impl RenderIdentity {
             params: params.into_iter().map(|(k, v)| (k.to_owned(), v)).collect(),
             seed: plan.seed,
             error_target: plan.error_target.is_some(),
+            pyramid_edges: plan.pyramid_edges,
             film_size: scene.film_size,
             window: scene.window,
             scene_hash: scene_hash(scene),
@@ -116,11 +122,17 @@ impl RenderIdentity {
     /// The first difference from another identity, in words about the other.
     fn difference(&self, other: &RenderIdentity) -> Option<&'static str> {
         let target = if other.error_target { "with an error target" } else { "without an error target" };
+        let pyramid = match other.pyramid_edges {
+            Some(_) if self.pyramid_edges.is_some() => "a pyramid of another depth",
+            Some(_) => "with a pyramid of techniques",
+            None => "without a pyramid of techniques",
+        };
         let equal = [
             ("another integrator", other.integrator == self.integrator),
             ("other parameters of the integrator", other.params == self.params),
             ("another seed", other.seed == self.seed),
             (target, other.error_target == self.error_target),
+            (pyramid, other.pyramid_edges == self.pyramid_edges),
             ("another picture size", other.film_size == self.film_size),
             ("another crop window", other.window == self.window),
             ("another scene", other.scene_hash == self.scene_hash),
@@ -139,7 +151,11 @@ impl RenderIdentity {
     /// # Errors
     /// If the file system refuses.
     pub fn save(&self, path: &Path, estimators: &[Estimator]) -> Result<(), CheckpointError> {
-        let estimators = estimators.iter().map(|e| EstimatorRef { film: &e.film, state: e.integrator.state() });
+        let estimators = estimators.iter().map(|e| EstimatorRef {
+            film: &e.film,
+            state: e.integrator.state(),
+            pyramid: e.integrator.pyramid(),
+        });
         let contents = ContentsRef { identity: self, estimators: estimators.collect() };
         atomic_write(path, |file| encode(&contents, file))
             .map_err(|source| CheckpointError::Io { path: path.to_owned(), source })
@@ -155,9 +171,13 @@ impl RenderIdentity {
         if let Some(difference) = self.difference(&found.identity) {
             return Err(CheckpointError::Other { path: path.to_owned(), difference });
         }
-        let whole = found.estimators.iter().all(|e| e.film.is_of_window(self.window));
+        let has_pyramid = |e: &SavedEstimator| match (&e.pyramid, self.pyramid_edges) {
+            (Some(pyramid), Some(edges)) => pyramid.is_of(self.window, edges),
+            (pyramid, edges) => pyramid.is_none() && edges.is_none(),
+        };
+        let whole = found.estimators.iter().all(|e| e.film.is_of_window(self.window) && has_pyramid(e));
         if !whole || found.estimators.len() != self.estimators() {
-            let reason = "the checkpoint is damaged: its films are not those of this render".into();
+            let reason = "the checkpoint is damaged: its pictures are not those of this render".into();
             return Err(CheckpointError::Format { path: path.to_owned(), reason });
         }
         Ok(found.estimators)

@@ -85,22 +85,25 @@ fn estimators(scene: &PreparedScene, plan: &Plan, checkpoints: &Checkpoints) -> 
     let seeds = if plan.error_target.is_some() { half_seeds(plan.seed).to_vec() } else { vec![plan.seed] };
     let mut estimators: Vec<Estimator> =
         seeds.into_iter().map(|seed| Estimator::new(plan.method.build(), scene.window, seed)).collect();
+    let mut pyramids: Vec<Option<Pyramid>> =
+        estimators.iter().map(|_| plan.pyramid_edges.map(|edges| Pyramid::new(scene.window, edges))).collect();
     if let (Some(path), Some(identity)) = (&plan.resume, &checkpoints.identity) {
-        for (estimator, saved) in estimators.iter_mut().zip(identity.load(path)?) {
+        for ((estimator, pyramid), saved) in estimators.iter_mut().zip(&mut pyramids).zip(identity.load(path)?) {
             if !estimator.restore(scene, saved.film, &saved.state) {
                 let reason = "the checkpoint does not hold what this integrator has learnt";
                 return Err(JobError::Input(format!("{}: {reason}", path.display())));
             }
+            *pyramid = saved.pyramid;
         }
     }
-    if let Some(max_edges) = plan.pyramid_edges {
-        for estimator in &mut estimators {
-            if !estimator.integrator.keep_pyramid(scene.window, max_edges) {
-                return Err(JobError::Input(format!(
-                    "{} has no techniques to tell apart; --pyramid needs a bidirectional integrator",
-                    plan.method.spec.name
-                )));
-            }
+    for (estimator, pyramid) in estimators.iter_mut().zip(pyramids) {
+        if let Some(pyramid) = pyramid
+            && !estimator.integrator.keep_pyramid(pyramid)
+        {
+            return Err(JobError::Input(format!(
+                "{} has no techniques to tell apart; --pyramid needs a bidirectional integrator",
+                plan.method.spec.name
+            )));
         }
     }
     Ok(estimators)

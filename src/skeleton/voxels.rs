@@ -225,7 +225,7 @@ fn touches(c: [Vec3; 3], half: f32) -> bool {
 mod tests {
     use super::*;
     use crate::math::hash::HashRng;
-    use crate::ray::{Instance, MeshBuffers, VertexBuffer};
+    use crate::ray::{Instance, MeshBuffers, SurfaceMask, VertexBuffer};
     use glam::Affine3A;
 
     /// Random triangles, small and large, and some of them again as a turned and stretched instance.
@@ -244,7 +244,7 @@ mod tests {
             // One that lies exactly on borders of cubes, and one without area.
             positions.extend([Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0, Vec3::ONE, Vec3::ONE * 2.0, Vec3::ONE * 3.0]);
             let triangles = (0..n as u32 + 2).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-            MeshBuffers { positions: VertexBuffer::new(positions), triangles }
+            MeshBuffers { positions: VertexBuffer::new(positions), triangles, surface: SurfaceMask::BLOCKERS }
         };
         let meshes = vec![mesh(20), mesh(10)];
         let to_world = Affine3A::from_rotation_y(0.7) * Affine3A::from_scale(Vec3::new(1.0, 2.0, 0.5));
@@ -289,7 +289,7 @@ mod tests {
         let p: Vec<Vec3> = (0..8u8).map(|k| Vec3::new((k & 1).into(), (k >> 1 & 1).into(), (k >> 2).into())).collect();
         let quads = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
         let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let mesh = MeshBuffers { positions: VertexBuffer::new(p), triangles };
+        let mesh = MeshBuffers { positions: VertexBuffer::new(p), triangles, surface: SurfaceMask::BLOCKERS };
         let geometry = Geometry { meshes: vec![mesh], world: vec![0], ..Geometry::default() };
         let grid = VoxelGrid::of_geometry(&geometry, 12);
         assert!(grid.dims.iter().all(|&d| d == grid.dims[0]), "{:?}", grid.dims);

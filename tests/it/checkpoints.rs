@@ -70,6 +70,27 @@ fn the_pyramid_of_a_render_with_an_error_target_is_that_of_both_halves() {
 }
 
 #[test]
+fn a_resumed_pyramid_is_that_of_an_uninterrupted_render() {
+    let sandbox = Sandbox::new();
+    let render = "render scene.xml -i two-stage -p presampled_paths=100 --quiet --pyramid p --pyramid-depth 3";
+    for target in ["", "--error-target mape=1e-9"] {
+        let run = |rest: &str| sandbox.run(&format!("{render} {target} {rest}"));
+        run("--spp 6 -o whole.pfm").expect(0, &[]);
+        let techniques = || (sandbox.read("p/sheet.png"), mean(&sandbox, "p/weighted.exr").to_bits());
+        let whole = techniques();
+        run("--spp 4 --checkpoint c").expect(0, &[]);
+        run("--spp 6 --resume c -o resumed.pfm").expect(0, &[]);
+        assert!(techniques() == whole, "{target}");
+        assert!(sandbox.read("whole.pfm") == sandbox.read("resumed.pfm"), "{target}");
+    }
+    sandbox.run("render scene.xml -i bdpt --spp 2 --checkpoint plain").expect(0, &[]);
+    sandbox.run("render scene.xml -i bdpt --spp 3 --resume plain --pyramid p").expect(2, &["without a pyramid"]);
+    sandbox.run("render scene.xml -i bdpt --spp 2 --checkpoint deep --pyramid p --pyramid-depth 2").expect(0, &[]);
+    sandbox.run("render scene.xml -i bdpt --spp 3 --resume deep").expect(2, &["with a pyramid"]);
+    sandbox.run("render scene.xml -i bdpt --spp 3 --resume deep --pyramid p").expect(2, &["another depth"]);
+}
+
+#[test]
 fn a_checkpoint_of_another_backend_is_refused() {
     let sandbox = Sandbox::new();
     sandbox.run("render scene.xml --spp 2 --checkpoint c --query obvhs").expect(0, &[]);
@@ -106,7 +127,7 @@ fn damaged_checkpoints_are_refused() {
     refused("empty", b"", "not a lightsieve checkpoint");
     refused("a picture", b"PF\n1 1\n-1.0\n123456789012", "not a lightsieve checkpoint");
     let other = [b"lightsieve-checkpoint-99", &whole[line..]].concat();
-    refused("a later version", &other, "version 99 of the format; this program reads version 3");
+    refused("a later version", &other, "version 99 of the format; this program reads version 4");
     let earlier = b"{\"format\":\"lightsieve-checkpoint-2\",\"integrator\":\"two-stage\"}\n0123456701234567";
     refused("an earlier version", earlier, "version 2 of the format");
 }

@@ -68,6 +68,7 @@ fn backends_agree_at_any_scale_and_place() {
             let meshes = scene.geometry.meshes.iter().map(|m| MeshBuffers {
                 positions: VertexBuffer::new(m.positions.iter().map(|&p| (p + shift) * scale).collect()),
                 triangles: m.triangles.clone(),
+                surface: m.surface,
             });
             let geometry = Arc::new(Geometry {
                 meshes: meshes.collect(),

@@ -70,7 +70,7 @@ impl RecordFactor for RecordMixtureFactor {
                 paths: records.paths as f32,
                 second_stage: None,
                 epsilon: EPSILON,
-                vertices_per_path: records.vertices_per_path() as f32,
+                vertices_per_path: records.counted.vertices_per_path() as f32,
             },
             uniform_share: UNIFORM as f32,
             unseen_fraction: UNSEEN_FRACTION,

@@ -4,8 +4,8 @@ use super::models::RecordFactor;
 use super::record_pmfs::{RecordPmfs, Selection, SelectionScheme};
 use super::records::ImportanceRecords;
 use super::running_means::RunningMeans;
-use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexStore, WarmUp};
-use crate::math::sampler::{PathSampler, SampleSlot};
+use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexCount, VertexStore, WarmUp};
+use crate::math::sampler::{PathSampler, SampleSlot, systematic};
 use crate::math::{Rgb, Vec3};
 use crate::mis::ConnectionFactor;
 use crate::mis::factors::RecordNormalization;
@@ -16,10 +16,6 @@ use crate::spatial::nearest::MAX_NEIGHBORS;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
-/// Sets of light sub-paths that estimate normalisations before the first iteration.
-const WARM_UP_SETS: u64 = 4;
-/// Light sub-paths of one of these sets, at most.
-const WARM_UP_PATHS: u32 = 4000;
 /// The fraction of the golden ratio: its multiples fill a circle evenly.
 const GOLDEN: f32 = 0.618_034;
 
@@ -81,8 +77,7 @@ pub(super) struct RecordStructure {
     /// For each s the fraction of light sub-paths that have at least s vertices, where one of each length is drawn.
     pub share_of_length: Vec<f32>,
     neighbors: usize,
-    /// Stored light vertices, and the sub-paths they come from, summed over sets.
-    counted: [u64; 2],
+    pub counted: VertexCount,
 }
 
 impl RecordStructure {
@@ -98,7 +93,7 @@ impl RecordStructure {
                 RecordPlaces::Surfaces { neighbors, .. } => neighbors,
                 RecordPlaces::Nodes { .. } => 1,
             },
-            counted: [0; 2],
+            counted: VertexCount::default(),
         }
     }
 
@@ -113,25 +108,14 @@ impl RecordStructure {
         near
     }
 
-    /// L, an estimate; 0 if nothing is known yet.
-    pub fn vertices_per_path(&self) -> f64 {
-        let [vertices, paths] = self.counted;
-        if paths > 0 { vertices as f64 / paths as f64 } else { 0.0 }
-    }
-
     /// Q at an eye vertex with these records, where all light vertices are drawn from together.
     #[inline]
     pub fn normalization(&self, near: &NearestRecords) -> RecordNormalization {
         let Some(records) = &self.records else { return RecordNormalization::default() };
         let near = near.records();
         let per_light = near.iter().map(|&r| self.means.probability_per_light(r)).sum::<f64>() / near.len() as f64;
-        let q = self.vertices_per_path() * records.mean_cosine() / per_light;
+        let q = self.counted.vertices_per_path() * records.mean_cosine() / per_light;
         RecordNormalization(if q.is_finite() { q as f32 } else { 0.0 })
-    }
-
-    fn count(&mut self, store: &VertexStore) {
-        self.counted[0] += store.len() as u64;
-        self.counted[1] += u64::from(store.paths_traced);
     }
 
     /// Fraction of light sub-paths with at least s vertices, as far as is known; never zero.
@@ -145,7 +129,7 @@ impl RecordStructure {
 #[derive(Serialize, Deserialize)]
 struct SavedRecords {
     means: RunningMeans,
-    counted: [u64; 2],
+    counted: VertexCount,
 }
 
 /// The strategy, with weights by the factor `F`.
@@ -184,9 +168,7 @@ impl<F: RecordFactor> RecordStrategy<F> {
             if present >= fraction {
                 continue;
             }
-            // Systematic draws; rounding must not make the cut one.
-            let cut = ((number as f32 + offset) / samples as f32).min(1.0 - f32::EPSILON);
-            let selection = pmfs.draw(class, near.records(), [record, cut]);
+            let selection = pmfs.draw(class, near.records(), [record, systematic(number, samples, offset)]);
             let draws = self.settings.paths as f32 * samples as f32;
             drawn(eye.store.candidate(selection.vertex, 1.0 / (selection.probability * draws * fraction)));
         }
@@ -218,21 +200,21 @@ impl<F: RecordFactor> ConnectionStrategy for RecordStrategy<F> {
         };
         let (structure, scheme) = (&mut self.structure, self.settings.scheme);
         if scheme.selection == Selection::PerLength {
-            let (store, s) = warm_up.light_vertices(WARM_UP_PATHS, 1, false);
+            let (store, s) = warm_up.light_vertices(WarmUp::MAX_PATHS, 1, false);
             stats.merge(&s);
             // A length that was not met is not impossible.
-            let share = |&n: &u32| (n as f32).max(0.5) / WARM_UP_PATHS as f32;
+            let share = |&n: &u32| (n as f32).max(0.5) / WarmUp::MAX_PATHS as f32;
             structure.share_of_length = store.lengths().iter().map(share).collect();
         }
         if !F::IS_ONE {
-            let paths = self.settings.paths.min(WARM_UP_PATHS);
-            for set in 1..=WARM_UP_SETS {
+            let paths = self.settings.paths.min(WarmUp::MAX_PATHS);
+            for set in 1..=WarmUp::SETS {
                 let (store, s) = warm_up.light_vertices(paths, set, false);
                 stats.merge(&s);
                 let mut pmfs = RecordPmfs::default();
                 stats.merge(&pmfs.find(&warm_up.iteration, &records, &store, scheme));
                 structure.means.learn(&pmfs);
-                structure.count(&store);
+                structure.counted.add(&store);
             }
         }
         structure.records = Some(records);
@@ -247,7 +229,7 @@ impl<F: RecordFactor> ConnectionStrategy for RecordStrategy<F> {
     fn learn(&mut self, store: &VertexStore) {
         if !F::IS_ONE {
             self.structure.means.learn(&self.structure.pmfs);
-            self.structure.count(store);
+            self.structure.counted.add(store);
         }
     }
 

@@ -3,16 +3,13 @@
 //! Each of C draws takes one of V stored vertices of M light sub-paths with the probability 1/V. A connection to the prefix ȳ that ends there
 //! is estimated by f / (C M p(ȳ) p(z̄) / V).
 
-use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexStore, WarmUp};
-use crate::math::sampler::{PathSampler, SampleSlot};
+use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexCount, VertexStore, WarmUp};
+use crate::math::sampler::{PathSampler, SampleSlot, systematic};
 use crate::math::{Rgb, Vec3};
 use crate::mis::factors::UniformFactor;
 use crate::path::StoredPlace;
 use crate::ray::RayStats;
 use serde::{Deserialize, Serialize};
-
-/// Light sub-paths that estimate the number of vertices before the first iteration, at most.
-const WARM_UP_PATHS: u32 = 4000;
 
 /// The strategy.
 #[derive(Debug)]
@@ -21,38 +18,23 @@ pub(super) struct VertexCache {
     paths: Option<u32>,
     /// C; decided by the warm-up if none is given.
     connections: Option<u32>,
-    state: VertexCount,
+    state: State,
 }
 
-/// The numbers that earlier iterations tell.
+/// Numbers that are decided before the first iteration, and what the stores of all iterations had.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-struct VertexCount {
+struct State {
     /// M.
     paths: u32,
     /// C.
     connections: u32,
-    /// Stored vertices, summed over iterations.
-    vertices_stored: u64,
-    /// Light sub-paths, summed over iterations.
-    paths_traced: u64,
-}
-
-impl VertexCount {
-    fn add(&mut self, store: &VertexStore) {
-        self.vertices_stored += store.len() as u64;
-        self.paths_traced += u64::from(store.paths_traced);
-    }
-
-    /// L; 0 if nothing is known yet.
-    fn vertices_per_path(&self) -> f64 {
-        if self.paths_traced > 0 { self.vertices_stored as f64 / self.paths_traced as f64 } else { 0.0 }
-    }
+    counted: VertexCount,
 }
 
 impl VertexCache {
     /// Draws `connections` times from the vertices of `paths` light sub-paths.
     pub fn new(paths: Option<u32>, connections: Option<u32>) -> VertexCache {
-        VertexCache { paths, connections, state: VertexCount::default() }
+        VertexCache { paths, connections, state: State::default() }
     }
 }
 
@@ -69,26 +51,26 @@ impl ConnectionStrategy for VertexCache {
     }
 
     fn factor(&self) -> UniformFactor {
-        UniformFactor { vertices_per_path: self.state.vertices_per_path() as f32 }
+        UniformFactor { vertices_per_path: self.state.counted.vertices_per_path() as f32 }
     }
 
     fn place(&mut self, warm_up: &WarmUp) -> RayStats {
         let [width, height] = warm_up.iteration.scene.film_size;
         let paths = self.paths.unwrap_or(width * height);
-        let (store, stats) = warm_up.light_vertices(paths.min(WARM_UP_PATHS), 1, false);
-        self.state = VertexCount { paths, ..VertexCount::default() };
-        self.state.add(&store);
-        let mean = self.state.vertices_per_path().round() as u32;
+        let (store, stats) = warm_up.light_vertices(paths.min(WarmUp::MAX_PATHS), 1, false);
+        self.state = State { paths, ..State::default() };
+        self.state.counted.add(&store);
+        let mean = self.state.counted.vertices_per_path().round() as u32;
         self.state.connections = self.connections.unwrap_or(mean.max(1));
         stats
     }
 
     fn learn(&mut self, store: &VertexStore) {
-        self.state.add(store);
+        self.state.counted.add(store);
     }
 
     fn reset(&mut self) {
-        self.state = VertexCount::default();
+        self.state = State::default();
     }
 
     #[inline]
@@ -110,7 +92,7 @@ impl ConnectionStrategy for VertexCache {
             if eye.fraction < 1.0 && sampler.rng().next_f32() >= eye.fraction {
                 continue;
             }
-            let u = (number as f32 + offset) / connections as f32;
+            let u = systematic(number, connections, offset);
             let candidate = eye.store.candidate(((u * vertices) as usize).min(eye.store.len() - 1), scale);
             if wanted(candidate.vertex.length()) {
                 connect(candidate);
@@ -122,7 +104,7 @@ impl ConnectionStrategy for VertexCache {
     fn edge(&self, (): &(), _y: &StoredPlace, _value: impl Fn(Vec3) -> Rgb) {}
 
     fn note(&self) -> Option<String> {
-        let VertexCount { paths, connections, .. } = self.state;
+        let State { paths, connections, .. } = self.state;
         (paths > 0)
             .then(|| format!("{connections} connections per eye vertex to the vertices of {paths} light sub-paths"))
     }

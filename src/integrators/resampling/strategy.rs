@@ -21,8 +21,8 @@ use super::models::CacheFactor;
 use super::path_count::{EYE_COST, VERTEX_COST, best_path_count};
 use super::pmfs::{Pmfs, Selection};
 use super::settings::ResamplingSettings;
-use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexStore, WarmUp};
-use crate::math::sampler::{PathSampler, SampleSlot};
+use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexCount, VertexStore, WarmUp};
+use crate::math::sampler::{PathSampler, SampleSlot, systematic};
 use crate::math::{Rgb, Vec3};
 use crate::mis::ConnectionFactor;
 use crate::mis::factors::Stages;
@@ -32,11 +32,6 @@ use crate::ray::{RayKind, RayStats, Tracer};
 use crate::spatial::nearest::MAX_NEIGHBORS;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
-
-/// Sets of light sub-paths that estimate normalisations before the first iteration.
-const WARM_UP_SETS: u64 = 4;
-/// Light sub-paths of one of these sets, at most.
-const WARM_UP_PATHS: u32 = 4000;
 
 /// The cache points near an eye vertex.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,25 +69,6 @@ impl CacheStructure {
             }
         }
         near
-    }
-}
-
-/// Stored light vertices and the sub-paths they come from, summed over sets.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-struct VertexCount {
-    vertices: u64,
-    paths: u64,
-}
-
-impl VertexCount {
-    fn add(&mut self, store: &VertexStore) {
-        self.vertices += store.len() as u64;
-        self.paths += u64::from(store.paths_traced);
-    }
-
-    /// L, an estimate; 0 if nothing is known yet.
-    fn vertices_per_path(&self) -> f64 {
-        if self.paths > 0 { self.vertices as f64 / self.paths as f64 } else { 0.0 }
     }
 }
 
@@ -140,14 +116,6 @@ impl<F: CacheFactor> CacheStrategy<F> {
             epsilon: self.settings.epsilon,
             vertices_per_path: self.counted.vertices_per_path() as f32,
         }
-    }
-
-    /// Where draw `number` of a vertex cuts the cumulative probabilities. The draws of a vertex are systematic: each cuts at the same
-    /// `offset` of its own part. Light vertices that are neighbours in the order of the pmf are neighbours in space.
-    #[inline]
-    fn cut(&self, number: u32, offset: f32) -> f32 {
-        // Rounding must not make it one.
-        ((number as f32 + offset) / self.settings.samples as f32).min(1.0 - f32::EPSILON)
     }
 
     /// Draws a candidate by the cache points `near`; `None` if there is nothing to draw.
@@ -226,10 +194,10 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
         let film_size = warm_up.iteration.scene.film_size;
         let pixels = f64::from(film_size[0]) * f64::from(film_size[1]);
         let eye_rays = stats.rays(&[RayKind::Cache]) / (pixels * self.settings.cache_fraction).max(1.0);
-        let paths = if self.settings.paths > 0 { self.settings.paths } else { pixels as u32 }.min(WARM_UP_PATHS);
+        let paths = if self.settings.paths > 0 { self.settings.paths } else { pixels as u32 }.min(WarmUp::MAX_PATHS);
         let second_stage = self.settings.second_stage.map(|m2| m2 as usize);
         let mut light_rays = 0.0;
-        for set in 1..=WARM_UP_SETS {
+        for set in 1..=WarmUp::SETS {
             let (store, s) = warm_up.light_vertices(paths, set, second_stage.is_some());
             stats.merge(&s);
             light_rays += s.rays(&[RayKind::Light, RayKind::LightBounce]);
@@ -282,7 +250,8 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
         for number in 0..self.settings.samples {
             let [cache, present, ..] = sampler.rng().next_4();
             if present < eye.fraction
-                && let Some(selection) = self.select(&near, [cache, self.cut(number, offset)], eye.store)
+                && let Some(selection) =
+                    self.select(&near, [cache, systematic(number, self.settings.samples, offset)], eye.store)
             {
                 let candidate = self.candidate(&near, selection, eye.fraction, eye.store);
                 if wanted(candidate.vertex.length()) {

@@ -13,6 +13,8 @@ pub struct Features {
     pub transmissive: bool,
     /// Light may go straight on as if there were no surface (mask, null).
     pub passes_through: bool,
+    /// Some lobe changes the direction of light, or absorbs it.
+    pub scatters: bool,
     /// Normals are tilted by a bump or normal map.
     pub tilted: bool,
     /// The back scatters light as well.
@@ -27,6 +29,11 @@ impl Features {
         !self.transmissive && !self.passes_through
     }
 
+    /// All light goes straight on as if there were no surface.
+    pub fn interface(&self) -> bool {
+        self.passes_through && !self.scatters
+    }
+
     /// Features of a surface without effect on light: masks' holes and null.
     pub(super) fn hole() -> Features {
         Features { delta: true, passes_through: true, two_sided: true, ..Features::default() }
@@ -39,6 +46,7 @@ impl Features {
             smooth: self.smooth || o.smooth,
             transmissive: self.transmissive || o.transmissive,
             passes_through: self.passes_through || o.passes_through,
+            scatters: self.scatters || o.scatters,
             tilted: self.tilted || o.tilted,
             two_sided: self.two_sided || o.two_sided,
             oriented: self.oriented || o.oriented,

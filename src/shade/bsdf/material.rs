@@ -47,7 +47,7 @@ impl Material {
 
     /// Mitsuba's material of shapes that name none: a diffuse reflectance of one half.
     fn default_material() -> Material {
-        let features = Features { smooth: true, ..Features::default() };
+        let features = Features { smooth: true, scatters: true, ..Features::default() };
         Material::new(Subtree::leaf(Node::lambertian(Rgb::grey(0.5)), features))
     }
 

@@ -83,6 +83,7 @@ pub(super) fn features_of<M: Model>(params: &M::Params) -> Features {
     Features {
         delta: M::DELTA,
         smooth: M::SMOOTH,
+        scatters: true,
         transmissive,
         two_sided: transmissive,
         oriented: M::is_oriented(params),

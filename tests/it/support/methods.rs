@@ -1,11 +1,13 @@
 //! The registered bidirectional methods, and parameters that make them do on small scenes all that they do on large ones.
 
+use lightsieve::film::Pyramid;
 use lightsieve::integrators::{IntegratorSpec, Params, REGISTRY};
 
 /// Every registered method that has techniques to tell apart.
 pub fn bidirectional_methods() -> impl Iterator<Item = &'static IntegratorSpec> {
-    let has_techniques =
-        |spec: &&'static IntegratorSpec| (spec.build)(&Params::defaults(spec)).keep_pyramid([0, 0, 1, 1], 1);
+    let has_techniques = |spec: &&'static IntegratorSpec| {
+        (spec.build)(&Params::defaults(spec)).keep_pyramid(Pyramid::new([0, 0, 1, 1], 1))
+    };
     REGISTRY.iter().copied().filter(has_techniques)
 }
 
@@ -26,5 +28,14 @@ pub fn for_small_scenes(spec: &IntegratorSpec, variant: usize) -> Vec<(&'static 
         ("connections_per_vertex", ["1", "4"][i % 2]),
         ("rr_scale", ["1", "0.4"][i % 2]),
     ];
-    all.into_iter().filter(|(name, _)| spec.params().any(|p| p.name == *name)).collect()
+    declared(spec, &all).collect()
+}
+
+/// Those of some values whose parameters a method has.
+pub fn declared<'a, 's>(
+    spec: &'s IntegratorSpec,
+    values: &'s [(&'a str, &'a str)],
+) -> impl Iterator<Item = (&'a str, &'a str)> + use<'a, 's> {
+    let has = |name: &str| spec.params().any(|p| p.name == name);
+    values.iter().copied().filter(move |(name, _)| has(name))
 }

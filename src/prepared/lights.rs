@@ -1,0 +1,120 @@
+//! The lights of a scene: one for every triangle of an emitting mesh, then the emitters.
+
+use super::MeshShading;
+use super::placing::PlacedScene;
+use crate::emit::{
+    DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, PointLight, RadianceTexture, SpotLight,
+    SunSky, SunSkyParams, TexturedEmission, TriangleEmission, TriangleLight,
+};
+use crate::math::{DVec3, Rgb, Vec2};
+use crate::ray::MeshBuffers;
+use crate::scene::{AreaEmission, ColorDesc, EmitterDesc, EmitterKind, ImageDesc, SceneDesc};
+use crate::shade::{ColorTexture, SurfacePoint, TextureSet};
+use std::sync::Arc;
+
+/// Where a scene is, and how large.
+#[derive(Clone, Copy)]
+pub(super) struct Extent {
+    /// In the coordinates of the file.
+    pub centre: DVec3,
+    /// Of a sphere around the centre that holds all surfaces.
+    pub radius: f32,
+}
+
+/// All lights. Each emitting mesh learns the number of the light that is its first triangle.
+pub(super) fn all_lights(
+    placed: &mut PlacedScene,
+    desc: &SceneDesc,
+    textures: &TextureSet,
+    extent: Extent,
+) -> Result<Vec<Light>, EmitError> {
+    let mut lights = vec![];
+    let meshes = placed.geometry.meshes.iter().zip(&mut placed.meshes);
+    for ((buffers, shading), emission) in meshes.zip(&placed.emission) {
+        if let Some(emission) = emission {
+            shading.first_light = Some(lights.len() as u32);
+            triangle_lights(buffers, shading, emission, textures, &mut lights);
+        }
+    }
+    for emitter in &desc.emitters {
+        lights.push(emitter_light(emitter, &desc.images, extent)?);
+    }
+    Ok(lights)
+}
+
+/// A texture as the emission of a surface.
+#[derive(Debug)]
+struct Emission(ColorTexture);
+
+impl RadianceTexture for Emission {
+    fn at(&self, uv: Vec2) -> Rgb {
+        self.0.eval(&SurfacePoint { uv, ..SurfacePoint::default() })
+    }
+
+    fn mean(&self) -> Rgb {
+        self.0.mean()
+    }
+}
+
+/// One light for every triangle of an emitting mesh, in the order of the triangles.
+fn triangle_lights(
+    buffers: &MeshBuffers,
+    shading: &MeshShading,
+    emission: &AreaEmission,
+    textures: &TextureSet,
+    lights: &mut Vec<Light>,
+) {
+    let textured: Option<Arc<dyn RadianceTexture>> = match emission.radiance {
+        ColorDesc::Constant(_) => None,
+        ColorDesc::Texture(_) => Some(Arc::new(Emission(textures.color(emission.radiance)))),
+    };
+    for (i, triangle) in buffers.triangles.iter().enumerate() {
+        let emission = match (&textured, emission.radiance) {
+            (None, ColorDesc::Constant(radiance)) => TriangleEmission::Constant(radiance),
+            (Some(texture), _) => {
+                let uv = if shading.uvs.is_empty() {
+                    [Vec2::ZERO, Vec2::X, Vec2::Y]
+                } else {
+                    triangle.map(|i| shading.uvs[i as usize])
+                };
+                TriangleEmission::Textured(Box::new(TexturedEmission { texture: texture.clone(), uv }))
+            }
+            (None, ColorDesc::Texture(_)) => TriangleEmission::Constant(Rgb::BLACK),
+        };
+        lights.push(Light::Triangle(TriangleLight::new(buffers.corners(i as u32), false, emission)));
+    }
+}
+
+fn emitter_light(emitter: &EmitterDesc, images: &[ImageDesc], extent: Extent) -> Result<Light, EmitError> {
+    let Extent { centre, radius } = extent;
+    Ok(match &emitter.kind {
+        EmitterKind::Point { position, intensity } => Light::Point(PointLight::new(*position, *intensity, centre)),
+        EmitterKind::Spot { to_world, intensity, cutoff_angle, beam_width } => {
+            Light::Spot(Box::new(SpotLight::new(*to_world, *intensity, *cutoff_angle, *beam_width, centre)?))
+        }
+        EmitterKind::Directional { direction, irradiance } => {
+            Light::Directional(DirectionalLight::new(*direction, *irradiance, radius)?)
+        }
+        environment => Light::Environment(Box::new(EnvironmentLight::new(surroundings(environment, images)?, radius))),
+    })
+}
+
+/// The radiance of a light that surrounds the scene.
+fn surroundings(kind: &EmitterKind, images: &[ImageDesc]) -> Result<Environment, EmitError> {
+    Ok(match kind {
+        EmitterKind::Envmap { image, scale, to_world } => match images.get(image.index()) {
+            Some(desc) => Environment::Map(Box::new(EnvMap::new(&desc.image, *scale, *to_world)?)),
+            None => Environment::Constant(Rgb::BLACK),
+        },
+        &EmitterKind::SunSky { to_world, sun_direction, turbidity, albedo, sky_scale, sun_scale, sun_aperture } => {
+            let params =
+                SunSkyParams { to_world, sun_direction, turbidity, albedo, sky_scale, sun_scale, sun_aperture };
+            Environment::SunSky(Box::new(SunSky::new(&params)?))
+        }
+        EmitterKind::Constant { radiance } => Environment::Constant(*radiance),
+        // Lights at a place do not surround the scene.
+        EmitterKind::Point { .. } | EmitterKind::Spot { .. } | EmitterKind::Directional { .. } => {
+            Environment::Constant(Rgb::BLACK)
+        }
+    })
+}

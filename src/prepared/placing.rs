@@ -1,0 +1,249 @@
+//! Meshes in their places: moved to the scene's centre in double precision, cleaned, and cut into what rays and what shading need.
+
+use super::MeshShading;
+use crate::math::{DVec3, Vec3};
+use crate::ray::{Geometry, Instance, MeshBuffers, SurfaceMask, VertexBuffer};
+use crate::scene::{AreaEmission, BsdfId, ColorDesc, Diagnostic, Diagnostics, MeshDesc, SceneDesc, ShapeDesc};
+use crate::shade::MaterialSet;
+use glam::{Affine3A, DMat3, DMat4, Mat3A};
+use rayon::prelude::*;
+
+/// The surfaces of a scene in their places. Positions are relative to the scene's centre.
+pub(super) struct PlacedScene {
+    pub geometry: Geometry,
+    /// Data of each mesh of `geometry` for shading.
+    pub meshes: Vec<MeshShading>,
+    /// What each mesh of `geometry` emits.
+    pub emission: Vec<Option<AreaEmission>>,
+    /// Inverse transposes of the instances' maps.
+    pub instance_normals: Vec<Mat3A>,
+}
+
+impl PlacedScene {
+    /// Places the shapes, groups and instances of a scene, whose meshes are used up.
+    pub fn new(
+        desc: &mut SceneDesc,
+        centre: DVec3,
+        materials: &MaterialSet,
+        diagnostics: &mut Diagnostics,
+    ) -> PlacedScene {
+        let mut placer = Placer { meshes: std::mem::take(&mut desc.meshes), uses: vec![], parts: vec![] };
+        placer.count_uses(desc);
+        let to_origin = DMat4::from_translation(-centre);
+        let mut geometry = Geometry::default();
+        let mut emission = vec![];
+        for shape in &desc.shapes {
+            geometry.world.push(emission.len() as u32);
+            emission.push(shape.emission.clone());
+            placer.place(shape, to_origin * shape.to_world, materials);
+        }
+        for group in &desc.groups {
+            let mut ids = vec![];
+            for shape in &group.shapes {
+                ids.push(emission.len() as u32);
+                emission.push(None);
+                if shape.emission.is_some() {
+                    diagnostics.push(emitter_in_group().at(shape.span.clone()));
+                }
+                placer.place(shape, shape.to_world, materials);
+            }
+            geometry.groups.push(ids);
+        }
+        let mut instance_normals = vec![];
+        for instance in &desc.instances {
+            let (to_world, normals) = affine(to_origin * instance.to_world);
+            geometry.instances.push(Instance { group: instance.group.0, to_world });
+            instance_normals.push(normals);
+        }
+        let (placed, removed): (Vec<_>, Vec<_>) = placer.finish();
+        warn_of_flat_triangles(removed, diagnostics);
+        let meshes;
+        (geometry.meshes, meshes) = placed.into_iter().unzip();
+        PlacedScene { geometry, meshes, emission, instance_normals }
+    }
+}
+
+fn emitter_in_group() -> Diagnostic {
+    Diagnostic::warning("scene::emitter-in-group", "a shape of a shapegroup cannot emit; its light is ignored")
+}
+
+/// Names meshes of which triangles were removed. Validation names triangles that are flat in their file; here are those that were flattened by
+/// their place.
+fn warn_of_flat_triangles(removed: Vec<(String, usize)>, diagnostics: &mut Diagnostics) {
+    if diagnostics.list.iter().any(|d| d.code == "scene::flat-triangles") {
+        return;
+    }
+    for (name, count) in removed.into_iter().filter(|&(_, n)| n > 0) {
+        let message = format!("{count} triangles of {name} have no area and were removed");
+        diagnostics.push(Diagnostic::warning("mesh::degenerate", message));
+    }
+}
+
+/// Centre of the box around everything, in double precision.
+pub(super) fn centre(desc: &SceneDesc) -> DVec3 {
+    let mut bounds: Option<(DVec3, DVec3)> = None;
+    let mut grow = |shape: &ShapeDesc, outer: DMat4| {
+        let Some(mesh) = desc.meshes.get(shape.mesh.index()) else { return };
+        if mesh.positions.is_empty() {
+            return;
+        }
+        // The corners of the object's box bound the placed object; tightness does not matter for a centre.
+        let (lo, hi) = mesh
+            .positions
+            .par_iter()
+            .fold(|| (Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)))
+            .reduce(|| (Vec3::INFINITY, Vec3::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+        for i in 0..8 {
+            let pick = |bit: u32, lo: f32, hi: f32| f64::from(if i >> bit & 1 == 0 { lo } else { hi });
+            let corner = DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z));
+            let p = (outer * shape.to_world).transform_point3(corner);
+            if p.is_finite() {
+                let (lo, hi) = bounds.unwrap_or((p, p));
+                bounds = Some((lo.min(p), hi.max(p)));
+            }
+        }
+    };
+    for shape in &desc.shapes {
+        grow(shape, DMat4::IDENTITY);
+    }
+    for instance in &desc.instances {
+        for shape in desc.groups.get(instance.group.index()).map_or(&[][..], |g| &g.shapes) {
+            grow(shape, instance.to_world);
+        }
+    }
+    bounds.map_or(DVec3::ZERO, |(lo, hi)| 0.5 * (lo + hi))
+}
+
+fn affine(m: DMat4) -> (Affine3A, Mat3A) {
+    let linear = DMat3::from_mat4(m);
+    let single =
+        |m: DMat3| Mat3A::from_cols(m.x_axis.as_vec3().into(), m.y_axis.as_vec3().into(), m.z_axis.as_vec3().into());
+    let to_world = Affine3A { matrix3: single(linear), translation: m.w_axis.truncate().as_vec3().into() };
+    (to_world, single(linear.inverse().transpose()))
+}
+
+/// A mesh in its place, cut into what rays and what shading need.
+type PlacedMesh = (MeshBuffers, MeshShading);
+
+/// A mesh on its way to its place.
+struct Part {
+    mesh: MeshDesc,
+    to_place: DMat4,
+    flip: bool,
+    material: Option<BsdfId>,
+    surface: SurfaceMask,
+    wants_tangents: bool,
+    wants_uvs: bool,
+    wants_colors: bool,
+}
+
+/// Hands out meshes: the last user of a mesh takes it over, earlier ones copy it.
+struct Placer {
+    meshes: Vec<MeshDesc>,
+    uses: Vec<u32>,
+    parts: Vec<Part>,
+}
+
+impl Placer {
+    fn count_uses(&mut self, desc: &SceneDesc) {
+        self.uses = vec![0; self.meshes.len()];
+        for shape in desc.shapes.iter().chain(desc.groups.iter().flat_map(|g| &g.shapes)) {
+            if let Some(n) = self.uses.get_mut(shape.mesh.index()) {
+                *n += 1;
+            }
+        }
+    }
+
+    fn place(&mut self, shape: &ShapeDesc, to_place: DMat4, materials: &MaterialSet) {
+        let i = shape.mesh.index();
+        let mesh = match self.uses.get_mut(i) {
+            Some(1) => std::mem::take(&mut self.meshes[i]),
+            Some(n) => {
+                *n -= 1;
+                self.meshes[i].clone()
+            }
+            None => MeshDesc::default(),
+        };
+        let material = shape.bsdf;
+        let wants = materials.get(material).features();
+        let emission_textured = shape.emission.as_ref().is_some_and(|e| matches!(e.radiance, ColorDesc::Texture(_)));
+        self.parts.push(Part {
+            mesh,
+            to_place,
+            flip: shape.flip_normals,
+            material,
+            surface: if wants.interface() { SurfaceMask::INTERFACES } else { SurfaceMask::BLOCKERS },
+            wants_tangents: wants.oriented,
+            wants_uvs: wants.textured || wants.oriented || emission_textured,
+            wants_colors: wants.textured,
+        });
+    }
+
+    /// Every mesh in its place, and how many triangles of which mesh had no area.
+    fn finish(self) -> (Vec<PlacedMesh>, Vec<(String, usize)>) {
+        self.parts
+            .into_par_iter()
+            .map(|part| {
+                let name = part.mesh.name.clone();
+                let (placed, removed) = place(part);
+                (placed, (name, removed))
+            })
+            .unzip()
+    }
+}
+
+/// Moves a mesh to its place, drops triangles without area, and turns triangles so that their winding agrees with the vertex
+/// normals (the side of a surface is the side of its geometric normal everywhere after this).
+fn place(part: Part) -> (PlacedMesh, usize) {
+    let Part { mut mesh, to_place, flip, material, surface, wants_tangents, wants_uvs, wants_colors } = part;
+    if to_place != DMat4::IDENTITY {
+        mesh.positions.par_iter_mut().for_each(|p| *p = to_place.transform_point3(p.as_dvec3()).as_vec3());
+        let normal_map = DMat3::from_mat4(to_place).inverse().transpose();
+        mesh.normals.par_iter_mut().for_each(|n| *n = (normal_map * n.as_dvec3()).normalize_or_zero().as_vec3());
+    }
+    if flip {
+        mesh.normals.par_iter_mut().for_each(|n| *n = -*n);
+        mesh.triangles.par_iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    let before = mesh.triangles.len();
+    let (positions, normals) = (&mesh.positions, &mesh.normals);
+    let cross = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| positions[i as usize]);
+        (b - a).cross(c - a)
+    };
+    // Shading normalises this single precision cross product: a triangle for which that fails has no area.
+    let has_area = |t: &[u32; 3]| {
+        let length2 = cross(t).length_squared();
+        length2.is_finite() && length2 > f32::MIN_POSITIVE
+    };
+    let mut triangles = std::mem::take(&mut mesh.triangles);
+    if !triangles.par_iter().all(has_area) {
+        triangles.retain(has_area);
+    }
+    let mut flat = true;
+    if !normals.is_empty() {
+        flat = triangles
+            .par_iter_mut()
+            .map(|t| {
+                let n = t.map(|i| normals[i as usize]);
+                let mut ng = cross(t).normalize();
+                if ng.dot(n[0] + n[1] + n[2]) < 0.0 {
+                    t.swap(1, 2);
+                    ng = -ng;
+                }
+                // Normals that only repeat the face's own tell nothing.
+                n.iter().all(|n| n.dot(ng) > 1.0 - 1e-6)
+            })
+            .reduce(|| true, |a, b| a && b);
+    }
+    let removed = before - triangles.len();
+    let shading = MeshShading {
+        normals: if flat { vec![] } else { mesh.normals },
+        uvs: if wants_uvs { mesh.uvs } else { vec![] },
+        colors: if wants_colors { mesh.colors } else { vec![] },
+        material,
+        first_light: None,
+        wants_tangents,
+    };
+    ((MeshBuffers { surface, positions: VertexBuffer::new(mesh.positions), triangles }, shading), removed)
+}
