@@ -42,8 +42,9 @@
 //! # }
 //! ```
 //!
-//! Words and notation (used in names and docs): a full path x_0 … x_k runs from the light (x_0) to the camera (x_k); `wo` is
-//! the direction a walk came from, `wi` the one it goes on in; a density says its measure in its type ([`math::measure`]).
+//! Words and notation (used in names and docs): a full path x_0 … x_k runs from the light (x_0) to the camera (x_k);
+//! `wo` is the direction a walk came from, `wi` the one it goes on in; a density says its measure in its type
+//! ([`math::measure`]).
 
 pub mod math;
 pub mod image;

@@ -1,4 +1,5 @@
-//! The Cornell box: the measured proportions of the original (Cornell University Program of Computer Graphics), rounded.
+//! The Cornell box: the measured proportions of the original (Cornell University Program of Computer Graphics),
+//! rounded.
 
 use crate::scene::Scene;
 use crate::shapes::{block, quad, slab, v3};

@@ -1,5 +1,5 @@
-//! A dark room with the door ajar; the lamp stands in the next room and shines at its ceiling. After the idea of Veach's
-//! door scene (1997), with furniture of its own.
+//! A dark room with the door ajar; the lamp stands in the next room and shines at its ceiling. After the idea of
+//! Veach's door scene (1997), with furniture of its own.
 
 use crate::furniture::*;
 use crate::scene::{Metal, Scene, at, turned};
@@ -53,8 +53,8 @@ pub fn scene() -> Scene {
     s.put("trim", "paint", casing(opening, [0.0, 2.06], [0.0, 0.025]));
     s.put("trim", "paint", casing(opening, [0.0, 2.06], [-0.175, -0.15]));
 
-    // Hinged on the left, ajar into this room: the camera looks at the dark side of the leaf, past which the light falls
-    // on the wall to its right.
+    // Hinged on the left, ajar into this room: the camera looks at the dark side of the leaf, past which the light
+    // falls on the wall to its right.
     let ajar = |m: crate::mesh::Mesh| m.turned(-45.0).at(opening[0] + 0.005, 0.008, -0.03);
     s.put("door", "paint", ajar(door_leaf(0.88, 2.04)));
     s.put("handle", "brass", ajar(door_handle(0.88)));

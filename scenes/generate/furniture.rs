@@ -177,8 +177,8 @@ pub fn books(length: f64, seed: u64, classes: usize) -> Vec<Mesh> {
     out
 }
 
-/// A hanging curtain from x = 0 to `w`, heights `y`, in folds of depth `a` and about `pitch` apart. It has two layers and
-/// hems, because light must not leak where a thin sheet's shading normals lean to its other side.
+/// A hanging curtain from x = 0 to `w`, heights `y`, in folds of depth `a` and about `pitch` apart. It has two layers
+/// and hems, because light must not leak where a thin sheet's shading normals lean to its other side.
 pub fn curtain(w: f64, y: [f64; 2], a: f64, pitch: f64) -> Mesh {
     let folds = (w / pitch).round().max(1.0);
     let cells = (folds * 11.0) as usize;

@@ -149,8 +149,8 @@ pub fn curve<const N: usize>(points: &[[f64; N]], per: usize) -> Vec<[f64; N]> {
     out
 }
 
-/// Turns a profile of (radius, height) about the y axis. A profile that runs upwards on the outside faces outwards; bends
-/// of more than 40° stay sharp.
+/// Turns a profile of (radius, height) about the y axis. A profile that runs upwards on the outside faces outwards;
+/// bends of more than 40° stay sharp.
 pub fn lathe(profile: &[[f64; 2]], n: usize) -> Mesh {
     let mut m = Mesh::default();
     // Radii that are zero but for rounding, such as the sine of π, are zero.
@@ -298,8 +298,8 @@ pub fn above_arch(points: &[[f64; 2]], top: f64, z0: f64, z1: f64) -> Mesh {
     m
 }
 
-/// A wall in the xy plane from x0 to x1, y0 to y1, between z0 and z1, with rectangular holes [x0, x1, y0, y1] that must be
-/// in ascending x and apart from one another.
+/// A wall in the xy plane from x0 to x1, y0 to y1, between z0 and z1, with rectangular holes [x0, x1, y0, y1] that must
+/// be in ascending x and apart from one another.
 pub fn wall(x: [f64; 2], y: [f64; 2], z: [f64; 2], holes: &[[f64; 4]]) -> Mesh {
     let mut m = Mesh::default();
     let mut piece = |x0: f64, x1: f64, y0: f64, y1: f64| {

@@ -1,10 +1,11 @@
 //! Whether this processor has the instruction sets that the program was compiled for.
 //!
 //! Without the check, a program on an older processor dies of an illegal instruction, which explains nothing. The macro
-//! `is_x86_feature_detected!` cannot make it: features that are enabled at compile time are constants of value true to it. So the
-//! CPUID instruction itself is asked. All crates are compiled for the same instruction sets, this file too, and copying a struct by a
-//! vector register would already be too much: it works on single whole numbers, and prints by functions of the standard
-//! library, which is compiled for the oldest processors. `.ci/run` starts the program on an emulated one.
+//! `is_x86_feature_detected!` cannot make it: features that are enabled at compile time are constants of value true to
+//! it. So the CPUID instruction itself is asked. All crates are compiled for the same instruction sets, this file too,
+//! and copying a struct by a vector register would already be too much: it works on single whole numbers, and prints by
+//! functions of the standard library, which is compiled for the oldest processors. `.ci/run` starts the program on an
+//! emulated one.
 
 #[cfg(target_arch = "x86_64")]
 mod x86_64 {
@@ -41,7 +42,8 @@ mod x86_64 {
         };
     }
 
-    /// Bits of Intel's Software Developer's Manual, volume 2, CPUID, and AMD's Programmer's Manual, volume 3, appendix E.
+    /// Bits of Intel's Software Developer's Manual, volume 2, CPUID, and AMD's Programmer's Manual, volume 3, appendix
+    /// E.
     static INSTRUCTION_SETS: [InstructionSet; 20] = [
         instruction_set!("sse3", Basic, 0),
         instruction_set!("ssse3", Basic, 9),

@@ -1,11 +1,12 @@
 //! How many samples of each group of techniques a render takes, decided once from its first iterations.
 //!
-//! The first two iterations take all samples, and are part of the picture like any other. Their samples tell the cost and the variance of
-//! other numbers (`mis::allocation`); the best allocation holds from then on. No group is ever given up: light that the first iterations did
-//! not meet could be rare and bright, so that a sixteenth of the connections and a sixteenth or, where they serve the light image only,
-//! a sixty-fourth of the light sub-paths always stay. Nor do too many pixels share one: their noise is alike, and no sum of squares
-//! tells. The decision depends on earlier iterations only, so every iteration is unbiased, and on counts of rays instead of times, so it
-//! is the same for any machine.
+//! The first two iterations take all samples, and are part of the picture like any other. Their samples tell the cost
+//! and the variance of other numbers (`mis::allocation`); the best allocation holds from then on. No group is ever
+//! given up: light that the first iterations did not meet could be rare and bright, so that a sixteenth of the
+//! connections and a sixteenth or, where they serve the light image only, a sixty-fourth of the light sub-paths always
+//! stay. Nor do too many pixels share one: their noise is alike, and no sum of squares tells. The decision depends on
+//! earlier iterations only, so every iteration is unbiased, and on counts of rays instead of times, so it is the same
+//! for any machine.
 
 use super::contribution::Contribution;
 use crate::film::{Film, TILE};

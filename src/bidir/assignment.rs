@@ -1,12 +1,13 @@
 //! The light sub-path that each pixel is connected to, where there are fewer of these than pixels.
 //!
-//! A connection is one sample of its technique for its pixel, whatever other pixels connect to the same light sub-path: assignment leaves the
-//! estimate of each pixel and its weights alone, except that the light image gets fewer splats. Its cost is that the noise of pixels
-//! with one light sub-path is correlated. They are therefore kept apart, and are others in every iteration.
+//! A connection is one sample of its technique for its pixel, whatever other pixels connect to the same light sub-path:
+//! assignment leaves the estimate of each pixel and its weights alone, except that the light image gets fewer splats.
+//! Its cost is that the noise of pixels with one light sub-path is correlated. They are therefore kept apart, and are
+//! others in every iteration.
 //!
-//! The full film is cut into blocks of 16 × 16 pixels, as into tiles. The k pixels that share a light sub-path are all in one block, and
-//! one is its home: its splats are made where that pixel is rendered. So a crop knows the sub-paths of its pixels without the rest of the
-//! film.
+//! The full film is cut into blocks of 16 × 16 pixels, as into tiles. The k pixels that share a light sub-path are all
+//! in one block, and one is its home: its splats are made where that pixel is rendered. So a crop knows the sub-paths
+//! of its pixels without the rest of the film.
 
 use crate::math::hash::HashRng;
 use crate::path::streams;

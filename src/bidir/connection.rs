@@ -13,8 +13,8 @@ use crate::shade::Transport;
 
 /// Unit direction from `z` to `y` and the square of their distance; `None` if they cannot be connected.
 ///
-/// Points that cannot be told apart have no direction between them. A point that lies in the plane of the other up to the rounding of both is
-/// on neither side of it: two sides of one wall would see each other.
+/// Points that cannot be told apart have no direction between them. A point that lies in the plane of the other up to
+/// the rounding of both is on neither side of it: two sides of one wall would see each other.
 #[inline]
 fn edge_between(z: &StoredPlace, y: &StoredPlace) -> Option<(Vec3, f32)> {
     let offset = y.position() - z.position();

@@ -1,4 +1,5 @@
-//! Emitters as an eye sub-path meets them: next event (s = 1) and hits (s = 0), for path tracing and all bidirectional methods.
+//! Emitters as an eye sub-path meets them: next event (s = 1) and hits (s = 0), for path tracing and all bidirectional
+//! methods.
 
 use crate::emit::{DirectSample, Light, LightId};
 use crate::math::sampler::{PathSampler, SampleSlot};
@@ -13,8 +14,8 @@ pub fn light_choice_normal(scene: &PreparedScene, vertex: &Vertex) -> Option<Vec
     if scene.lights.uses_light_tree() { vertex.light_choice_normal() } else { None }
 }
 
-/// Draws a light and a point of it as seen from `vertex`, whose light choice normal is `normal`, and hands them over with the probability
-/// of the light.
+/// Draws a light and a point of it as seen from `vertex`, whose light choice normal is `normal`, and hands them over
+/// with the probability of the light.
 #[inline]
 pub fn sample_direct(
     scene: &PreparedScene,
@@ -26,7 +27,8 @@ pub fn sample_direct(
     let u = sampler.vertex(vertex.index, SampleSlot::Emitter);
     let p = vertex.position();
     let Some((id, pmf)) = scene.lights.sample_light_from(p, normal, u[0]) else { return };
-    // Two copies of the caller's code: the sample of a triangle, by far the most common, stays in registers; others go through memory.
+    // Two copies of the caller's code: the sample of a triangle, by far the most common, stays in registers; others go
+    // through memory.
     match scene.lights.get(id) {
         Light::Triangle(light) => {
             if let Some(sample) = light.sample_direct(p, [u[1], u[2]]) {
@@ -53,7 +55,8 @@ pub struct DirectLight {
 }
 
 impl DirectLight {
-    /// The light of `sample`, which was drawn from a light of probability `pmf`; `None` if the vertex scatters none of it.
+    /// The light of `sample`, which was drawn from a light of probability `pmf`; `None` if the vertex scatters none of
+    /// it.
     #[inline(always)]
     pub fn new(
         vertex: &Vertex,
@@ -91,8 +94,8 @@ pub fn for_each_background(scene: &PreparedScene, direction: Vec3, mut each: imp
     }
 }
 
-/// Density per steradian with which next event at the start of `edge` would have drawn the point of the light `id` at its end, in the unit
-/// direction `direction`; `normal` is the light choice normal there.
+/// Density per steradian with which next event at the start of `edge` would have drawn the point of the light `id` at
+/// its end, in the unit direction `direction`; `normal` is the light choice normal there.
 #[inline]
 pub fn next_event_pdf(
     scene: &PreparedScene,

@@ -150,7 +150,8 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         self.strategy.place(&WarmUp { iteration: iteration.with_index(0), eye_limits, light_limits })
     }
 
-    /// Traces the light sub-paths that all eye sub-paths share, connects them to the lens, and finds the pmfs of their vertices.
+    /// Traces the light sub-paths that all eye sub-paths share, connects them to the lens, and finds the pmfs of their
+    /// vertices.
     fn shared_light_pass(&mut self, iteration: &Iteration) -> PassOutput {
         let (mut output, mut phases) = (PassOutput::default(), Phases::default());
         output.stats = phases.time("placing caches", || self.place(iteration));
@@ -378,7 +379,8 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         allocated && self.strategy.restore(&saved.strategy)
     }
 
-    /// Gets the stored light vertices of an iteration ready as they were when it was rendered; once for any number of pixels.
+    /// Gets the stored light vertices of an iteration ready as they were when it was rendered; once for any number of
+    /// pixels.
     fn prepare_replay(&mut self, iteration: &Iteration) {
         let wanted = (iteration.seed, iteration.index);
         if self.ready_to_replay == Some(wanted) || !self.draws_stored() {

@@ -54,7 +54,8 @@ pub(super) struct EyeHooks<'a, S: ConnectionStrategy, K> {
     pub lens: Vec3,
     /// Knowledge about either side of the last vertex, as far as it was asked for.
     pub lookups: [Option<S::Lookup>; 2],
-    /// Knowledge about the side of the vertex before the last from which the walk left, visibility of the last vertex included.
+    /// Knowledge about the side of the vertex before the last from which the walk left, visibility of the last vertex
+    /// included.
     pub lookup_before: S::Lookup,
     /// The light choice normal of the vertex before.
     pub normal_before: Option<Vec3>,
@@ -251,8 +252,8 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         ReversePath { vertices: self.pdfs.reverse(), edges: self.pdfs.edges(), last_edge, throughput, value }
     }
 
-    /// Value and density at an eye vertex of light that comes along `from` and goes on to the vertex before; the value only if factors
-    /// depend on it.
+    /// Value and density at an eye vertex of light that comes along `from` and goes on to the vertex before; the value
+    /// only if factors depend on it.
     #[inline]
     pub(super) fn reverse_scatter(&self, vertex: &Vertex, from: Vec3) -> (Rgb, SolidAnglePdf) {
         let (directions, p, mode) = (&self.rules.mis.directions, vertex.position(), Transport::Importance);
@@ -262,7 +263,8 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         }
     }
 
-    /// The argument of the factor of the edge from `vertex` to the vertex before, for light that comes to `vertex` along `from`.
+    /// The argument of the factor of the edge from `vertex` to the vertex before, for light that comes to `vertex`
+    /// along `from`.
     #[inline]
     pub(super) fn edge_before(&self, vertex: &Vertex, from: Vec3) -> EdgeOf<S> {
         let value = |to: Vec3| vertex.scatter.eval(from, to, Transport::Importance);

@@ -61,7 +61,8 @@ impl WalkHooks for EyeSubpathVertices {
 }
 
 impl WarmUp<'_> {
-    /// The connectable vertices of `fraction` times as many eye sub-paths as the full picture has pixels, stratified over the picture.
+    /// The connectable vertices of `fraction` times as many eye sub-paths as the full picture has pixels, stratified
+    /// over the picture.
     pub fn eye_vertices(&self, fraction: f64) -> (EyeSubpathVertices, RayStats) {
         let (scene, seed) = (self.iteration.scene, self.iteration.seed);
         let [width, height] = scene.film_size.map(f64::from);

@@ -122,8 +122,9 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
         self.splat(&LensConnection { s, lens: &lens, segment, raw, weight, u: [u[2], u[3]] }, tracer);
     }
 
-    /// Weight of the technique (s, 1) that connects y_{s−1} with `lens`: `area_jacobian` turns a density per steradian at the lens into one
-    /// per unit area at y_{s−1}, from where a walk that came from the lens would go on to the vertex before with the density `pdf_rev_prev`.
+    /// Weight of the technique (s, 1) that connects y_{s−1} with `lens`: `area_jacobian` turns a density per steradian
+    /// at the lens into one per unit area at y_{s−1}, from where a walk that came from the lens would go on to the
+    /// vertex before with the density `pdf_rev_prev`.
     fn lens_weight(
         &self,
         s: usize,

@@ -62,7 +62,8 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         self.light_rules(iteration).trace(&mut light_sampler(iteration, number), tracer, light, purpose);
     }
 
-    /// Traces all light sub-paths of an iteration whose eye vertices draw from the first `kept` of them, which are left in `store`.
+    /// Traces all light sub-paths of an iteration whose eye vertices draw from the first `kept` of them, which are left
+    /// in `store`.
     pub(super) fn light_pass(&self, iteration: &Iteration, kept: u32, store: &mut VertexStore) -> Vec<TileOutput> {
         let techniques = &self.mis.techniques;
         let splats = if techniques.uses_light_image() { techniques.light_paths() as u32 } else { 0 };
@@ -88,7 +89,8 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         kept_chunks.chain(others).enumerate().map_init(|| ThreadScratch::new(self.probe_stride), trace).collect()
     }
 
-    /// Traces the light sub-paths in a row of blocks whose home pixels are outside of the window: only their splats matter.
+    /// Traces the light sub-paths in a row of blocks whose home pixels are outside of the window: only their splats
+    /// matter.
     pub(super) fn outside_splats(
         &self,
         iteration: &Iteration,

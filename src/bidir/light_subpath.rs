@@ -125,7 +125,8 @@ pub(super) struct LightHooks<'a, 'r, S: ConnectionStrategy> {
 }
 
 impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
-    /// c of the connection of the vertex before to `vertex`, where the sub-path arrived with the area density `pdf_fwd`.
+    /// c of the connection of the vertex before to `vertex`, where the sub-path arrived with the area density
+    /// `pdf_fwd`.
     #[inline]
     fn connection_factor(&self, vertex: &Vertex, pdf_fwd: AreaPdf, tracer: &mut Tracer) -> f32 {
         if S::Factor::IS_ONE {
@@ -154,8 +155,8 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
         factor.c(&light, &strategy.edge(&lookup, &y.place, |to| bsdf.eval(y.wo, to, Transport::Importance)))
     }
 
-    /// c_1 of paths whose first two vertices are the light's and `vertex`; `area_jacobian` turns a density per steradian at `vertex` into one
-    /// per unit area at the light.
+    /// c_1 of paths whose first two vertices are the light's and `vertex`; `area_jacobian` turns a density per
+    /// steradian at `vertex` into one per unit area at the light.
     fn next_event_factor(&self, vertex: &Vertex, area_jacobian: f32) -> f32 {
         let (scene, p) = (self.rules.scene, vertex.position());
         let chosen = scene.lights.pmf_light_from(p, light_choice_normal(scene, vertex), self.id);

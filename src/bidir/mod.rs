@@ -1,8 +1,9 @@
-//! The core that all bidirectional methods share: light and eye sub-paths, the store of light vertices, connections, next event, hits,
-//! connections to the lens, and the passes of an iteration.
+//! The core that all bidirectional methods share: light and eye sub-paths, the store of light vertices, connections,
+//! next event, hits, connections to the lens, and the passes of an iteration.
 //!
 //! [`Bidirectional`] is the engine. Methods differ in a [`ConnectionStrategy`]: which light sub-paths an eye vertex is connected to; and in its
-//! [`ConnectionFactor`](crate::mis::ConnectionFactor): what that does to the density of a connection. One iteration goes through
+//! [`ConnectionFactor`](crate::mis::ConnectionFactor): what that does to the density of a connection. One iteration
+//! goes through
 //!
 //! ```text
 //! strategy.factor → light_pass: light_subpath → store   → strategy.prepare (pmfs)
@@ -10,8 +11,9 @@
 //!                                                         └ endpoint (hits, next event) → film
 //! ```
 //!
-//! A technique (s, t) is told by its ends: s = 0 the eye walk met a light; s = 1, t ≥ 2 next event; s ≥ 2, t ≥ 2 a connection;
-//! t = 1 a splat of the light image, to which the light sub-paths of the full film contribute, also when only part of it is rendered.
+//! A technique (s, t) is told by its ends: s = 0 the eye walk met a light; s = 1, t ≥ 2 next event; s ≥ 2, t ≥ 2 a
+//! connection; t = 1 a splat of the light image, to which the light sub-paths of the full film contribute, also when
+//! only part of it is rendered.
 //!
 //! Weights are `mis`'s. Visibility rays wait in queues and go out in packets; nothing depends on how these were filled.
 

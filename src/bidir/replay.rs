@@ -113,9 +113,11 @@ impl Replay {
         }
     }
 
-    /// The path that connects the first s − 1 surface vertices of the light sub-path and the first `eye_vertices` of the eye sub-path.
+    /// The path that connects the first s − 1 surface vertices of the light sub-path and the first `eye_vertices` of
+    /// the eye sub-path.
     pub fn path(&self, origin: Origin, s: usize, eye_vertices: usize, lens: Vec3) -> FullPath {
-        // The event at the end of a sub-path is the connection, if there is one, and not the event by which the walk went on.
+        // The event at the end of a sub-path is the connection, if there is one, and not the event by which the walk
+        // went on.
         let first = |records: &[VertexRecord], n: usize| {
             let mut part: Vec<Interior> = records[..n].iter().map(|v| v.interior.clone()).collect();
             if let (Some(v), true) = (part.last_mut(), s > 0) {

@@ -114,7 +114,8 @@ impl<F: ConnectionFactor> ThreadScratch<F> {
         }
     }
 
-    /// Sends off the queued rays to the lens and hands over the results, after the contributions `probed` of eye sub-paths.
+    /// Sends off the queued rays to the lens and hands over the results, after the contributions `probed` of eye
+    /// sub-paths.
     pub fn finish(&mut self, mut tracer: Tracer, probed: Vec<Contribution>) -> TileOutput {
         self.splats.probed.extend(probed);
         self.splats.flush(&mut tracer);

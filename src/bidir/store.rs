@@ -85,7 +85,8 @@ impl VertexCount {
 }
 
 impl VertexStore {
-    /// Forgets everything but the memory; the sub-paths to come are written into so many chunks, of which vertices can number 2¹⁶.
+    /// Forgets everything but the memory; the sub-paths to come are written into so many chunks, of which vertices can
+    /// number 2¹⁶.
     pub fn begin(&mut self, chunks: u32) -> &mut [StoreChunk] {
         debug_assert!(chunks <= 1 << 16, "{chunks}");
         self.vertices.clear();

@@ -63,13 +63,14 @@ pub struct EyeVertex<'a, 'v> {
     pub fraction: f32,
 }
 
-/// The strategy of a bidirectional method. All functions have defaults that suit a strategy without memory and without cache points.
+/// The strategy of a bidirectional method. All functions have defaults that suit a strategy without memory and without
+/// cache points.
 pub trait ConnectionStrategy: Send + Sync {
     /// c of connections.
     type Factor: ConnectionFactor;
 
-    /// Knowledge about one side of an eye vertex that the factors of its connections share, e.g. its nearest cache points and which of them
-    /// see the light vertex.
+    /// Knowledge about one side of an eye vertex that the factors of its connections share, e.g. its nearest cache
+    /// points and which of them see the light vertex.
     type Lookup: Copy + Default;
 
     /// [`ConnectionStrategy::edge`] depends on the light vertex, and [`ConnectionStrategy::see`] on its visibility.
@@ -88,8 +89,8 @@ pub trait ConnectionStrategy: Send + Sync {
     /// The factor of the coming iteration, from what earlier ones found.
     fn factor(&self) -> Self::Factor;
 
-    /// Before the first iteration, if it has connections: places cache points and estimates normalisations. Depends on scene and seed
-    /// alone.
+    /// Before the first iteration, if it has connections: places cache points and estimates normalisations. Depends on
+    /// scene and seed alone.
     fn place(&mut self, _warm_up: &WarmUp) -> RayStats {
         RayStats::default()
     }
@@ -105,7 +106,8 @@ pub trait ConnectionStrategy: Send + Sync {
     /// Forgets everything: the next iteration is the first.
     fn reset(&mut self) {}
 
-    /// Draws the light sub-paths that an eye vertex is connected to, of those lengths s that are `wanted`, and hands them to `connect`.
+    /// Draws the light sub-paths that an eye vertex is connected to, of those lengths s that are `wanted`, and hands
+    /// them to `connect`.
     fn draw<'a>(
         &'a self,
         eye: &EyeVertex<'a, '_>,
@@ -124,8 +126,8 @@ pub trait ConnectionStrategy: Send + Sync {
     #[inline]
     fn see(&self, _lookup: &mut Self::Lookup, _y: &SegmentEnd, _tracer: &mut Tracer) {}
 
-    /// The argument of the factor of the edge from a light vertex at `y` to the eye vertex of the look-up; `value` is the adjoint BSDF value
-    /// at `y` for a direction.
+    /// The argument of the factor of the edge from a light vertex at `y` to the eye vertex of the look-up; `value` is
+    /// the adjoint BSDF value at `y` for a direction.
     fn edge(
         &self,
         lookup: &Self::Lookup,

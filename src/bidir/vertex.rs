@@ -38,7 +38,8 @@ impl LightVertex {
         }
     }
 
-    /// q̂₂/p and q̂₁/p at a surface at `p` on the side of the unit normal `n`, visibility taken for granted. `bsdf` is the vertex's BSDF.
+    /// q̂₂/p and q̂₁/p at a surface at `p` on the side of the unit normal `n`, visibility taken for granted. `bsdf` is
+    /// the vertex's BSDF.
     #[inline]
     pub fn target_over_pdf(&self, bsdf: &BsdfView, p: Vec3, n: Vec3) -> ResamplingTarget {
         let Some((towards, jacobian)) = direction_to(self.place.position(), p, n) else {
@@ -53,8 +54,8 @@ impl LightVertex {
     }
 }
 
-/// Unit direction from `from` to a surface at `p` on the side of the unit normal `n`, and the area Jacobian |cos| / d² there; none if it
-/// arrives from below.
+/// Unit direction from `from` to a surface at `p` on the side of the unit normal `n`, and the area Jacobian |cos| / d²
+/// there; none if it arrives from below.
 #[inline]
 pub fn direction_to(from: Vec3, p: Vec3, n: Vec3) -> Option<(Vec3, f32)> {
     let to = p - from;

@@ -14,7 +14,8 @@ pub enum ErrorView {
 /// Exponents of ten at the two ends of the colour scale.
 pub const DECADES: [f64; 2] = [-5.0, 1.0];
 
-/// The scale's colours from small to large errors: black, blue, magenta, orange, yellow, white, each lighter than the one before.
+/// The scale's colours from small to large errors: black, blue, magenta, orange, yellow, white, each lighter than the
+/// one before.
 const SCALE: [[f64; 3]; 6] =
     [[0.0, 0.0, 0.0], [0.05, 0.03, 0.35], [0.45, 0.02, 0.4], [0.9, 0.2, 0.1], [0.98, 0.75, 0.1], [1.0, 1.0, 0.95]];
 

@@ -1,5 +1,5 @@
-//! OpenEXR in, all of it: every channel of full resolution under its full name, and the header's texts. For pictures that this
-//! program has written and that somebody wants to compute with; textures go through [`super::read_image`].
+//! OpenEXR in, all of it: every channel of full resolution under its full name, and the header's texts. For pictures
+//! that this program has written and that somebody wants to compute with; textures go through [`super::read_image`].
 
 use super::buffer::{Image, Pixels};
 use super::read::{ImageError, ImageFault, check_size, read_file};
@@ -39,7 +39,8 @@ impl ExrFile {
         if !bytes.starts_with(b"\x76\x2f\x31\x01") {
             return Err(ImageFault::damaged("EXR", "it does not begin like one"));
         }
-        // A decoder that panics has a bug of its own; whoever has a damaged file should still get an error that names it.
+        // A decoder that panics has a bug of its own; whoever has a damaged file should still get an error that names
+        // it.
         std::panic::catch_unwind(|| decode(bytes))
             .unwrap_or_else(|_| Err(ImageFault::damaged("EXR", "its decoder gave up")))
     }

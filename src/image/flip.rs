@@ -1,8 +1,8 @@
 //! ꟻLIP: how different two pictures look to somebody who flips between them, 0 (equal) to 1 per pixel.
 //!
-//! LDR-ꟻLIP: Andersson et al., "ꟻLIP: A Difference Evaluator for Alternating Images", HPG 2020. HDR-ꟻLIP: Andersson et al.,
-//! "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics Short Papers 2021: the largest LDR-ꟻLIP over a
-//! range of exposures.
+//! LDR-ꟻLIP: Andersson et al., "ꟻLIP: A Difference Evaluator for Alternating Images", HPG 2020. HDR-ꟻLIP: Andersson et
+//! al., "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics Short Papers 2021: the largest
+//! LDR-ꟻLIP over a range of exposures.
 
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -62,8 +62,8 @@ fn clip(v: f64) -> f64 {
     v.clamp(0.0, 1.0)
 }
 
-/// Coefficients of Narkowicz's fit of the ACES curve, (k0 x² + k1 x + k2) / (k3 x² + k4 x + k5), with its exposure factor 0.6
-/// multiplied in (2021 paper).
+/// Coefficients of Narkowicz's fit of the ACES curve, (k0 x² + k1 x + k2) / (k3 x² + k4 x + k5), with its exposure
+/// factor 0.6 multiplied in (2021 paper).
 const ACES: [f64; 6] = [0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14];
 
 fn aces(x: f64) -> f64 {
@@ -72,8 +72,8 @@ fn aces(x: f64) -> f64 {
     if x > 1e8 { k0 / k3 } else { ((k0 * x + k1) * x + k2) / ((k3 * x + k4) * x + k5) }
 }
 
-/// Exposures in stops that bring the reference's brightest and its median luminance to 85 % of the tone mapper's range, and
-/// steps of at most one stop between them (2021 paper).
+/// Exposures in stops that bring the reference's brightest and its median luminance to 85 % of the tone mapper's range,
+/// and steps of at most one stop between them (2021 paper).
 fn exposures(reference: &[Colour]) -> Vec<f64> {
     const TARGET: f64 = 0.85;
     let [k0, k1, k2, k3, k4, k5] = ACES;

@@ -1,7 +1,7 @@
 //! Picture files into memory: PNG, JPEG, TGA, Radiance HDR, OpenEXR, PFM, PGM and PPM.
 //!
-//! The format is recognised by the first bytes, not by the ending (only TGA has no such bytes). Sizes are checked against
-//! the length of the file before anything is allocated, and no input makes this module panic.
+//! The format is recognised by the first bytes, not by the ending (only TGA has no such bytes). Sizes are checked
+//! against the length of the file before anything is allocated, and no input makes this module panic.
 
 use super::buffer::{Image, Pixels, srgb_to_linear};
 use super::{exr_in, netpbm};
@@ -80,14 +80,14 @@ impl ImageFault {
 /// Longest file taken, and most bytes a decoded picture may hold.
 const MAX_BYTES: u64 = 1 << 32;
 
-/// How many times larger than its file a picture may be. Deflate shrinks at most 1032 times, JPEG needs a bit per block,
-/// which comes to 1365 times, and the pixels of all the formats at most triple when decoded.
+/// How many times larger than its file a picture may be. Deflate shrinks at most 1032 times, JPEG needs a bit per
+/// block, which comes to 1365 times, and the pixels of all the formats at most triple when decoded.
 const MAX_EXPANSION: u64 = 1 << 12;
 
 /// Reads a picture. Eight-bit files stay eight-bit; everything else becomes linear floats, row 0 at the top.
 ///
-/// Grey stays one channel; grey with alpha becomes four. Of an EXR file the nameless layer is taken if it has colours, else
-/// the first layer that has.
+/// Grey stays one channel; grey with alpha becomes four. Of an EXR file the nameless layer is taken if it has colours,
+/// else the first layer that has.
 ///
 /// # Errors
 /// [`ImageError`], with the file's name, for anything that is not a sound picture of a known format.

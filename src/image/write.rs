@@ -1,4 +1,5 @@
-//! Rendered pictures out of memory: EXR (all layers and metadata), PFM (the main layer) and PNG (the main layer, for eyes).
+//! Rendered pictures out of memory: EXR (all layers and metadata), PFM (the main layer) and PNG (the main layer, for
+//! eyes).
 
 use super::atomic::atomic_write;
 use super::buffer::linear_to_srgb;

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-/// The outcome of [`z_test`]. Variances that come from samples that are stratified over iterations are too large, so that
-/// `rms` is below one for equal expectations; few samples make the tails heavier than the normal distribution's.
+/// The outcome of [`z_test`]. Variances that come from samples that are stratified over iterations are too large, so
+/// that `rms` is below one for equal expectations; few samples make the tails heavier than the normal distribution's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ZTest {
     /// Values (pixels times channels) that have a variance and were tested.
@@ -25,8 +25,8 @@ pub struct ZTest {
 /// Chance of an alarm where there is nothing.
 const SIGNIFICANCE: f64 = 1e-3;
 
-/// Tests two pictures with the variances of their pixels' means. A picture without variance is taken as exact. None if no value
-/// has a variance.
+/// Tests two pictures with the variances of their pixels' means. A picture without variance is taken as exact. None if
+/// no value has a variance.
 pub fn z_test(
     image: (&[[f64; 3]], Option<&[[f64; 3]]>),
     reference: (&[[f64; 3]], Option<&[[f64; 3]]>),
@@ -66,7 +66,8 @@ pub fn z_test(
 
 /// The z that a normal variable's absolute value exceeds with the probability p.
 pub fn two_sided_quantile(p: f64) -> f64 {
-    // Bisection of the tail; Mills' ratio as a continued fraction where the tail is thin (Abramowitz & Stegun 1964, eq. 26.2.14).
+    // Bisection of the tail; Mills' ratio as a continued fraction where the tail is thin (Abramowitz & Stegun 1964, eq.
+    // 26.2.14).
     let tail = |z: f64| {
         let density = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
         if z > 2.0 {

@@ -1,4 +1,5 @@
-//! Bidirectional methods as integrators: the engine of `bidir` behind the trait, and the settings that their parameters have in common.
+//! Bidirectional methods as integrators: the engine of `bidir` behind the trait, and the settings that their parameters
+//! have in common.
 
 use super::{Integrator, Iteration, Params, Replay};
 use crate::bidir::allocation::combinations;
@@ -24,7 +25,8 @@ pub fn settings(params: &Params, techniques: Techniques) -> BidirSettings {
     }
 }
 
-/// [`settings`] of methods that draw connections from many light sub-paths, where eye sub-paths may end sooner at Lambertian surfaces.
+/// [`settings`] of methods that draw connections from many light sub-paths, where eye sub-paths may end sooner at
+/// Lambertian surfaces.
 pub fn resampled_settings(params: &Params, techniques: Techniques) -> BidirSettings {
     let mut settings = settings(params, techniques);
     // By way of percent, so that the rounding is that of checkpoints and pictures that exist.

@@ -1,6 +1,7 @@
 //! Rendering algorithms: one folder and one registry line each.
 //!
-//! Parameters, help texts, refusals and the tests that run over every integrator come from [`REGISTRY`], never from a second list.
+//! Parameters, help texts, refusals and the tests that run over every integrator come from [`REGISTRY`], never from a
+//! second list.
 
 pub mod bdpt;
 pub mod bidirectional;
@@ -68,7 +69,8 @@ pub fn find(name: &str) -> Option<&'static IntegratorSpec> {
 /// A rendering algorithm at work.
 pub trait Integrator: Send {
     /// Adds one sample per pixel to the film, in parallel on the current thread pool; the result must not depend on the
-    /// number of threads. The caller has begun the iteration ([`Film::begin_iteration`]), so that the film counts it already.
+    /// number of threads. The caller has begun the iteration ([`Film::begin_iteration`]), so that the film counts it
+    /// already.
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats;
 
     /// State after the iterations so far, for a checkpoint.
@@ -76,7 +78,8 @@ pub trait Integrator: Send {
         vec![]
     }
 
-    /// Goes on from a state of the same scene, seed and parameters; `iteration` is the next. False if the state is of something else.
+    /// Goes on from a state of the same scene, seed and parameters; `iteration` is the next. False if the state is of
+    /// something else.
     fn restore(&mut self, _iteration: &Iteration, state: &[u8]) -> bool {
         state.is_empty()
     }
@@ -86,8 +89,8 @@ pub trait Integrator: Send {
         vec![]
     }
 
-    /// Adds the picture of every technique to `pyramid`, which is empty or of the iterations so far; false if there are no techniques to tell
-    /// apart.
+    /// Adds the picture of every technique to `pyramid`, which is empty or of the iterations so far; false if there are
+    /// no techniques to tell apart.
     fn keep_pyramid(&mut self, _pyramid: Pyramid) -> bool {
         false
     }

@@ -5,7 +5,8 @@ use super::mitsuba::look_at;
 use crate::scene::{FilmDesc, FilterDesc, FovAxis, SceneDesc, SensorDesc};
 use glam::DVec3;
 
-/// A camera after the options; what they leave open is chosen so that the sphere around all shapes just fits into the picture.
+/// A camera after the options; what they leave open is chosen so that the sphere around all shapes just fits into the
+/// picture.
 pub(super) fn camera(scene: &SceneDesc, options: &CameraOptions) -> Result<SensorDesc, String> {
     let (center, radius) = bounding_sphere(scene);
     let [width, height] = options.resolution.unwrap_or([1280, 720]);

@@ -9,7 +9,8 @@ use std::fmt;
 pub(super) struct MeshOptions {
     /// Drop vertex normals: the surface is faceted.
     pub face_normals: bool,
-    /// Texture v becomes 1 − v. Pictures have v = 0 at their *top* row here, as in Mitsuba 3; OBJ files have it at the bottom.
+    /// Texture v becomes 1 − v. Pictures have v = 0 at their *top* row here, as in Mitsuba 3; OBJ files have it at the
+    /// bottom.
     pub flip_v: bool,
     /// The mesh is placed by a transform that mirrors. Vertex normals of the file keep their meaning then (they go with
     /// the inverse transpose), while the winding turns round: it is reversed here so that both stay on one side.
@@ -67,7 +68,8 @@ impl fmt::Display for MeshError {
     }
 }
 
-/// Applies the options to a mesh as the file has it: normals dropped, completed or generated, v flipped, winding turned.
+/// Applies the options to a mesh as the file has it: normals dropped, completed or generated, v flipped, winding
+/// turned.
 pub(super) fn finish(mesh: &mut MeshDesc, options: MeshOptions) {
     if options.flip_v {
         for uv in &mut mesh.uvs {

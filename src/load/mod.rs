@@ -1,7 +1,7 @@
 //! Scene files to `SceneDesc`: Mitsuba XML, OBJ with MTL, a lone PLY. Knows nothing of rendering.
 //!
-//! Every loader collects diagnostics instead of stopping at the first; pictures and meshes are decoded in parallel once the
-//! text has been read, and the whole scene is validated at the end.
+//! Every loader collects diagnostics instead of stopping at the first; pictures and meshes are decoded in parallel once
+//! the text has been read, and the whole scene is validated at the end.
 
 mod assets;
 mod framing;

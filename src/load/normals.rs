@@ -1,5 +1,5 @@
-//! Vertex normals: made where a file has none (corner angles as weights, Thürmer & Wüthrich 1998, "Computing vertex normals
-//! from polygonal facets"), brought to unit length where it has.
+//! Vertex normals: made where a file has none (corner angles as weights, Thürmer & Wüthrich 1998, "Computing vertex
+//! normals from polygonal facets"), brought to unit length where it has.
 
 use crate::scene::MeshDesc;
 use glam::Vec3;
@@ -68,7 +68,8 @@ mod tests {
 
     #[test]
     fn weigh_by_angle_not_by_area() {
-        // A right angle in the plane z = 0 and a far larger triangle upright on y = 0, with half the angle at the shared corner.
+        // A right angle in the plane z = 0 and a far larger triangle upright on y = 0, with half the angle at the
+        // shared corner.
         let p = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [100., 0., 0.], [100., 0., 100.]].map(Vec3::from);
         let n = angle_weighted(&p, &[[0, 1, 2], [0, 3, 4]])[0];
         let want = Vec3::new(0.0, -1.0, 2.0).normalize();

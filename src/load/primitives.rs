@@ -1,5 +1,6 @@
-//! Shapes of a formula as triangles, after Mitsuba's parametrisations. Curved ones have exact vertex normals, and their radius is
-//! a little larger than one so that the *area* of the triangles is the true one: an emitter's power is that of the formula.
+//! Shapes of a formula as triangles, after Mitsuba's parametrisations. Curved ones have exact vertex normals, and their
+//! radius is a little larger than one so that the *area* of the triangles is the true one: an emitter's power is that
+//! of the formula.
 
 use super::mesh;
 use crate::scene::MeshDesc;

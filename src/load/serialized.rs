@@ -1,8 +1,9 @@
-//! Mitsuba's `.serialized` meshes, versions 3 and 4: zlib streams one after the other, and a table of where each begins.
+//! Mitsuba's `.serialized` meshes, versions 3 and 4: zlib streams one after the other, and a table of where each
+//! begins.
 //!
-//! Layout (Mitsuba 0.6 documentation, "Serialized mesh loader"): u16 0x041C, u16 version, then deflated: [version 4: name, zero],
-//! u32 flags, u64 vertices, u64 triangles, positions, [normals], [uvs], [colours], indices; at the file's end the offsets of
-//! all meshes (u32 in version 3, u64 in version 4) and their number as u32. All little endian.
+//! Layout (Mitsuba 0.6 documentation, "Serialized mesh loader"): u16 0x041C, u16 version, then deflated: [version 4:
+//! name, zero], u32 flags, u64 vertices, u64 triangles, positions, [normals], [uvs], [colours], indices; at the file's
+//! end the offsets of all meshes (u32 in version 3, u64 in version 4) and their number as u32. All little endian.
 
 use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
 use crate::math::Rgb;

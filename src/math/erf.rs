@@ -1,7 +1,7 @@
 //! The error function and its inverse in single precision.
 
-/// erf(x), absolute error below 3e-7 (Abramowitz & Stegun 1964, eq. 7.1.26 near and far from zero; a Taylor series where its
-/// relative error would be large).
+/// erf(x), absolute error below 3e-7 (Abramowitz & Stegun 1964, eq. 7.1.26 near and far from zero; a Taylor series
+/// where its relative error would be large).
 pub fn erf(x: f32) -> f32 {
     let ax = x.abs();
     if ax < 0.5 {
@@ -16,7 +16,8 @@ pub fn erf(x: f32) -> f32 {
     (1.0 - p * (-ax * ax).exp()).copysign(x)
 }
 
-/// erf⁻¹(y) for |y| < 1 (Giles 2010, "Approximating the erfinv function"); y is clamped to what single precision resolves.
+/// erf⁻¹(y) for |y| < 1 (Giles 2010, "Approximating the erfinv function"); y is clamped to what single precision
+/// resolves.
 pub fn erf_inv(y: f32) -> f32 {
     let y = y.clamp(-1.0 + f32::EPSILON, 1.0 - f32::EPSILON);
     let w = -((1.0 - y) * (1.0 + y)).ln();

@@ -26,8 +26,8 @@ impl Frame {
         }
     }
 
-    /// A frame around the unit normal `n` whose first tangent lies in the plane of `n` and `tangent` (dp/du), or any frame
-    /// when `tangent` is parallel to `n`, zero or not finite.
+    /// A frame around the unit normal `n` whose first tangent lies in the plane of `n` and `tangent` (dp/du), or any
+    /// frame when `tangent` is parallel to `n`, zero or not finite.
     pub fn from_normal_tangent(n: Vec3, tangent: Vec3) -> Frame {
         let s = tangent - n * n.dot(tangent);
         let len2 = s.length_squared();

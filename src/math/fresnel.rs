@@ -1,7 +1,7 @@
 //! Reflection at smooth interfaces (unpolarised), and the fits for its diffuse average.
 //!
-//! Dielectrics: Fresnel's equations; conductors: the same with a complex index (Moeller 1988, "Optics"). Refractive indices are
-//! relative, interior / exterior, where the normal points to the exterior.
+//! Dielectrics: Fresnel's equations; conductors: the same with a complex index (Moeller 1988, "Optics"). Refractive
+//! indices are relative, interior / exterior, where the normal points to the exterior.
 
 use super::{Rgb, Vec3};
 
@@ -16,8 +16,8 @@ pub struct Interface {
     pub eta: f32,
 }
 
-/// Reflection and refraction at an interface of relative index `eta` for a direction whose signed cosine to the normal is
-/// `cos_i` (positive: outside).
+/// Reflection and refraction at an interface of relative index `eta` for a direction whose signed cosine to the normal
+/// is `cos_i` (positive: outside).
 #[inline]
 pub fn dielectric(cos_i: f32, eta: f32) -> Interface {
     let eta_it = if cos_i >= 0.0 { eta } else { 1.0 / eta };
@@ -58,8 +58,8 @@ fn conductor_channel(cos: f32, eta: f32, k: f32) -> f32 {
     0.5 * (s + p)
 }
 
-/// Fraction of diffuse light that an interface of relative index `eta` reflects: fits by Egan & Hilgeman 1973 (η < 1) and
-/// d'Eon & Irving 2011 (η ≥ 1), both within 0.6 % for usual indices.
+/// Fraction of diffuse light that an interface of relative index `eta` reflects: fits by Egan & Hilgeman 1973 (η < 1)
+/// and d'Eon & Irving 2011 (η ≥ 1), both within 0.6 % for usual indices.
 pub fn diffuse_reflectance(eta: f32) -> f32 {
     let inv = 1.0 / eta;
     if eta < 1.0 {

@@ -1,5 +1,5 @@
-//! Hashed random numbers: every number is a pure function of (seed, stream, index, iteration, dimension), so that the same seed
-//! gives the same bits for any number of threads and any one sample can be computed again alone.
+//! Hashed random numbers: every number is a pure function of (seed, stream, index, iteration, dimension), so that the
+//! same seed gives the same bits for any number of threads and any one sample can be computed again alone.
 
 use super::float::ONE_MINUS_EPSILON;
 

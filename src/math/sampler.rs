@@ -14,7 +14,8 @@ use super::hash::{HashRng, hash_words, mix64};
 use sobol_burley::parts::{hash, owen_scramble_rev, sobol_rev, u32_to_f32_norm};
 use std::sync::LazyLock;
 
-/// Number `i` of `n` systematic samples of [0, 1): every sample is at the same `offset`, itself in [0, 1), of its own n-th part.
+/// Number `i` of `n` systematic samples of [0, 1): every sample is at the same `offset`, itself in [0, 1), of its own
+/// n-th part.
 #[inline]
 pub fn systematic(i: u32, n: u32, offset: f32) -> f32 {
     // Rounding must not make it one.

@@ -1,4 +1,5 @@
-//! Inverse trigonometric functions in single precision, without the general functions' care for directed rounding and signed zeros.
+//! Inverse trigonometric functions in single precision, without the general functions' care for directed rounding and
+//! signed zeros.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 

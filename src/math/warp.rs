@@ -7,8 +7,9 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 #[inline]
 pub fn square_to_disk(u: [f32; 2]) -> Vec2 {
     let (a, b) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
-    // Both halves of the map are one, with the axes exchanged. Which half it is is random, so a branch would be guessed wrong half
-    // of the time: the radius is the larger coordinate, the angle comes from the ratio, and the exchange is an exchange of bits.
+    // Both halves of the map are one, with the axes exchanged. Which half it is is random, so a branch would be guessed
+    // wrong half of the time: the radius is the larger coordinate, the angle comes from the ratio, and the exchange is
+    // an exchange of bits.
     let swap = 0u32.wrapping_sub(u32::from(b.abs() > a.abs()));
     let (r, other) = exchange(swap, a, b);
     let (sin, cos) = sin_cos_quarter(FRAC_PI_4 * (other / (r + f32::MIN_POSITIVE.copysign(r))));
@@ -24,8 +25,8 @@ fn exchange(mask: u32, a: f32, b: f32) -> (f32, f32) {
     (f32::from_bits(a ^ difference), f32::from_bits(b ^ difference))
 }
 
-/// Sine and cosine of an angle in [−π/4, π/4] by their series, to a unit in the last place; the general functions spend most of
-/// their time on reducing the angle.
+/// Sine and cosine of an angle in [−π/4, π/4] by their series, to a unit in the last place; the general functions spend
+/// most of their time on reducing the angle.
 #[inline]
 fn sin_cos_quarter(x: f32) -> (f32, f32) {
     let x2 = x * x;

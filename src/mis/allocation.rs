@@ -1,15 +1,17 @@
 //! How many samples each group of techniques is worth in a scene.
 //!
-//! With the balance heuristic the estimator of a pixel has the second moment ∫ f²/D, D = Σ n_i c_i p_i, and every sample is a sample of
-//! f/D. Other numbers of samples n′ change only D, and the weights that a sample's path gives to each group of techniques tell by how much:
-//! D′/D = Σ_groups (n′/n) w_group. So the samples of one setting predict the variance of any other, and with the costs of the groups
-//! the best of them (Grittmann et al. 2022, "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms").
+//! With the balance heuristic the estimator of a pixel has the second moment ∫ f²/D, D = Σ n_i c_i p_i, and every
+//! sample is a sample of f/D. Other numbers of samples n′ change only D, and the weights that a sample's path gives to
+//! each group of techniques tell by how much: D′/D = Σ_groups (n′/n) w_group. So the samples of one setting predict the
+//! variance of any other, and with the costs of the groups the best of them (Grittmann et al. 2022, "Efficiency-aware
+//! multiple importance sampling for bidirectional rendering algorithms").
 //!
-//! A pixel's sample X of all techniques with t ≥ 2, those of one eye sub-path, has a smaller variance than that: E(X²) − (E X)², where
-//! E(X²) also has the products of different contributions. In a well-lit room (E X)² is nearly all, and the second moment alone would
-//! overrate splats, whose numbers in a pixel are random. With two samples X₁, X₂ of each pixel, ½ (X₁ − X₂)² estimates its variance at full
-//! allocation, and with every contribution times n′/n D/D′ the variance at another one, but for the squares of single contributions: with
-//! fewer connections, each left out by itself, these fall by n′/n only once.
+//! A pixel's sample X of all techniques with t ≥ 2, those of one eye sub-path, has a smaller variance than that: E(X²)
+//! − (E X)², where E(X²) also has the products of different contributions. In a well-lit room (E X)² is nearly all, and
+//! the second moment alone would overrate splats, whose numbers in a pixel are random. With two samples X₁, X₂ of each
+//! pixel, ½ (X₁ − X₂)² estimates its variance at full allocation, and with every contribution times n′/n D/D′ the
+//! variance at another one, but for the squares of single contributions: with fewer connections, each left out by
+//! itself, these fall by n′/n only once.
 //!
 //! Sums are kept by region of the picture, so that each region counts relative to its own brightness.
 
@@ -76,8 +78,8 @@ fn square(value: [f64; 3]) -> f64 {
     value.into_iter().map(|v| v * v).sum::<f64>() / 3.0
 }
 
-/// Estimates from samples at full allocation, for each region of the picture and every candidate, by how much the candidate would increase
-/// the variance.
+/// Estimates from samples at full allocation, for each region of the picture and every candidate, by how much the
+/// candidate would increase the variance.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EfficiencyEstimator {
     candidates: Vec<SampleAllocation>,
@@ -122,8 +124,8 @@ impl EfficiencyEstimator {
         }
     }
 
-    /// Adds the sample of a pixel in the first or the second iteration, the sum of `contributions`, each of which is also added by
-    /// itself.
+    /// Adds the sample of a pixel in the first or the second iteration, the sum of `contributions`, each of which is
+    /// also added by itself.
     pub fn add_sample(&mut self, probe: Probe, contributions: &[WeightedContribution], times: f64) {
         let Probe { region, pixel, second } = probe;
         let n = self.candidates.len();
@@ -155,9 +157,10 @@ impl EfficiencyEstimator {
         }
     }
 
-    /// The candidate with the least product of variance and cost, or of those that are nearly as good the one with most connections.
-    /// `variances` has for each region the sum over samples of their variance at full allocation, and of its mean, squared, by which it
-    /// counts; a share of the mean over all regions keeps dark ones from counting too much.
+    /// The candidate with the least product of variance and cost, or of those that are nearly as good the one with most
+    /// connections. `variances` has for each region the sum over samples of their variance at full allocation, and of
+    /// its mean, squared, by which it counts; a share of the mean over all regions keeps dark ones from counting too
+    /// much.
     pub fn best(&self, variances: &[(f64, f64)], costs: &AllocationCosts) -> SampleAllocation {
         let overall = variances.iter().map(|v| v.1).sum::<f64>() / variances.len().max(1) as f64;
         let product = |number: usize| {
@@ -184,7 +187,8 @@ impl EfficiencyEstimator {
         good.max_by(order).map_or(SampleAllocation::FULL, |(allocation, _)| *allocation)
     }
 
-    /// True if the sums are of these candidates, as many regions and as many probed pixels: a saved state can be of another render.
+    /// True if the sums are of these candidates, as many regions and as many probed pixels: a saved state can be of
+    /// another render.
     pub fn fits(&self, candidates: &[SampleAllocation], regions: usize) -> bool {
         self.candidates == candidates
             && self.increases.len() == regions * candidates.len()
@@ -208,7 +212,8 @@ mod tests {
         WeightedContribution { value: Rgb::grey(value), weight, connection: false }
     }
 
-    /// ∫ f² / D by brute force, of three techniques with made-up densities, against what samples at full allocation predict.
+    /// ∫ f² / D by brute force, of three techniques with made-up densities, against what samples at full allocation
+    /// predict.
     #[test]
     fn other_efforts_are_predicted() {
         // f and the three densities on 20 cells of one integral.
@@ -249,8 +254,9 @@ mod tests {
         }
     }
 
-    /// The variance of a pixel's sample that is made of two contributions of an eye sub-path and of two connections to one light
-    /// sub-path, each of them there by itself with probability q, by brute force against what full allocation predicts.
+    /// The variance of a pixel's sample that is made of two contributions of an eye sub-path and of two connections to
+    /// one light sub-path, each of them there by itself with probability q, by brute force against what full allocation
+    /// predicts.
     #[test]
     fn the_variance_of_a_pixel_is_predicted() {
         let f = |k: usize, x: usize| 1.0 + k as f64 + (x as f64 * 0.7).sin();

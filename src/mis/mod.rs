@@ -1,13 +1,14 @@
 //! Densities and weights of every technique; nothing else computes a weight.
 //!
 //! A technique i takes n_i samples of density p_i; the heuristic weighs a path found by technique i with
-//! (n_i p_i)^β / Σ_j (n_j p_j)^β (Veach 1997, §9.2; β = 1 balance, β = 2 power). Ratios only: densities along a path are
-//! never multiplied up, and squares are taken of ratios so that they do not overflow.
+//! (n_i p_i)^β / Σ_j (n_j p_j)^β (Veach 1997, §9.2; β = 1 balance, β = 2 power). Ratios only: densities along a path
+//! are never multiplied up, and squares are taken of ratios so that they do not overflow.
 //!
-//! Next event and hits of a path tracer are two techniques, weighed by [`Heuristic::weight`]. Bidirectional ones are many: each
-//! sub-path keeps its densities in a [`SubpathPdfs`], and a [`MisContext`] weighs a path that connects two of them. [`oracle`] computes the
-//! same weights by their definition, slowly and in double precision, for tests and for explaining single paths. [`allocation`] tells from
-//! weights how many samples of each group of techniques a scene is worth.
+//! Next event and hits of a path tracer are two techniques, weighed by [`Heuristic::weight`]. Bidirectional ones are
+//! many: each sub-path keeps its densities in a [`SubpathPdfs`], and a [`MisContext`] weighs a path that connects two
+//! of them. [`oracle`] computes the same weights by their definition, slowly and in double precision, for tests and for
+//! explaining single paths. [`allocation`] tells from weights how many samples of each group of techniques a scene is
+//! worth.
 //!
 //! # Glossary
 //!
@@ -34,9 +35,9 @@
 //! | u | share of the uniform pmf in a mixture | probability | |
 //! | π | fraction of light that cache points do not see | ratio | |
 //!
-//! RISBPT: Nabata, Iwasaki & Dobashi 2020, "Resampling-aware weighting functions for bidirectional path tracing using multiple light
-//! sub-paths". Two-stage: Nabata, Iwasaki & Dobashi 2020, "Two-stage resampling for bidirectional path tracing with multiple light
-//! sub-paths".
+//! RISBPT: Nabata, Iwasaki & Dobashi 2020, "Resampling-aware weighting functions for bidirectional path tracing using
+//! multiple light sub-paths". Two-stage: Nabata, Iwasaki & Dobashi 2020, "Two-stage resampling for bidirectional path
+//! tracing with multiple light sub-paths".
 
 pub mod allocation;
 pub mod factor;
@@ -76,8 +77,8 @@ impl Heuristic {
         }
     }
 
-    /// Weight of the technique with density `own` against one with density `other`, both per steradian at the same point. A
-    /// density that is zero cannot have found the path; an infinite one outweighs all others.
+    /// Weight of the technique with density `own` against one with density `other`, both per steradian at the same
+    /// point. A density that is zero cannot have found the path; an infinite one outweighs all others.
     #[inline]
     pub fn weight(self, own: SolidAnglePdf, other: SolidAnglePdf) -> f32 {
         1.0 / (1.0 + self.power(other.0 / own.0)) // [Veach eq. 9.8]

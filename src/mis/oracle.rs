@@ -17,7 +17,8 @@ pub struct PathPdfs {
     pub light: Vec<f64>,
     /// p_E(v_i), from the lens's end.
     pub eye: Vec<f64>,
-    /// Whether the edge v_{i−1} v_i can be a connection, for i = 1 … k; and for i = 0, whether a ray can meet the light by chance.
+    /// Whether the edge v_{i−1} v_i can be a connection, for i = 1 … k; and for i = 0, whether a ray can meet the light
+    /// by chance.
     pub connectable: Vec<bool>,
     /// c_1, see `mis::weight`.
     pub next_event: f64,
@@ -25,8 +26,8 @@ pub struct PathPdfs {
     pub connection_factors: Vec<f64>,
 }
 
-/// Two neighbouring vertices of a path, of which the first could have been the last of a resampled light sub-path, and the second the eye
-/// vertex that it was connected to.
+/// Two neighbouring vertices of a path, of which the first could have been the last of a resampled light sub-path, and
+/// the second the eye vertex that it was connected to.
 #[derive(Clone, Copy, Debug)]
 pub struct AdjacentVertices<'a> {
     /// The one nearer to the light, y_{s−1}.

@@ -1,11 +1,13 @@
 //! The densities that one walk knows of the vertices it made.
 //!
-//! Write u_0, u_1, … for the vertices of a sub-path (y from the light, z from the camera). A [`VertexPdfs`] keeps for each of them the area
-//! density p_fwd with which this walk made it, and the ratio p_rev / p_fwd, where p_rev is the density with which a walk from the *other* end
-//! would have made it. Products of such ratios lead from a technique to its neighbours, so nothing else is ever multiplied up.
+//! Write u_0, u_1, … for the vertices of a sub-path (y from the light, z from the camera). A [`VertexPdfs`] keeps for
+//! each of them the area density p_fwd with which this walk made it, and the ratio p_rev / p_fwd, where p_rev is the
+//! density with which a walk from the *other* end would have made it. Products of such ratios lead from a technique to
+//! its neighbours, so nothing else is ever multiplied up.
 //!
-//! Densities of a vertex at infinity are per steradian of its direction; the disk that emission rays start on stands in for
-//! the direction's density at the next vertex (see `emit::sample`). [`VertexPdfs::area_jacobian`] hides the difference.
+//! Densities of a vertex at infinity are per steradian of its direction; the disk that emission rays start on stands in
+//! for the direction's density at the next vertex (see `emit::sample`). [`VertexPdfs::area_jacobian`] hides the
+//! difference.
 
 use super::factor::ConnectionFactor;
 use crate::math::measure::area_jacobian;
@@ -16,23 +18,27 @@ use crate::shade::{BsdfSample, Transport};
 /// Densities of a vertex of a sub-path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexPdfs {
-    /// p_fwd: area density with which this sub-path's walk makes the vertex, survival of roulette at the vertex before included.
+    /// p_fwd: area density with which this sub-path's walk makes the vertex, survival of roulette at the vertex before
+    /// included.
     pub pdf_fwd: AreaPdf,
-    /// Turns a density per steradian at this vertex, of directions towards the vertex before, into an area density of the vertex before:
+    /// Turns a density per steradian at this vertex, of directions towards the vertex before, into an area density of
+    /// the vertex before:
     /// |cos| there / d²; 1 if that vertex is at infinity. Of a vertex that is itself at infinity: |cos| there, for the density
     /// per unit area of the emission disk.
     pub area_jacobian: f32,
     /// Survival of roulette at this vertex, where the walk from the other end plays it.
     pub survival: f32,
-    /// p_rev / p_fwd, without the survival at the vertex after this one. Valid once the walk has left the vertex after it.
+    /// p_rev / p_fwd, without the survival at the vertex after this one. Valid once the walk has left the vertex after
+    /// it.
     pub rev_over_fwd: f32,
-    /// Both directions of the path at this vertex have a density (no delta event), so that the edges beside it can be connections. Valid
-    /// once the walk has left it.
+    /// Both directions of the path at this vertex have a density (no delta event), so that the edges beside it can be
+    /// connections. Valid once the walk has left it.
     pub connectable: bool,
     /// Light sub-paths: c of the connection that ends at this vertex (see [`ConnectionFactor`]).
     pub connection_factor: f32,
-    /// Partial sums of effective densities: the techniques that use no vertices of this sub-path but those before this one (see
-    /// [`MisContext::accumulate_partial_sums`](super::MisContext::accumulate_partial_sums)). Valid once the walk has left the vertex.
+    /// Partial sums of effective densities: the techniques that use no vertices of this sub-path but those before this
+    /// one (see [`MisContext::accumulate_partial_sums`](super::MisContext::accumulate_partial_sums)). Valid once the
+    /// walk has left the vertex.
     pub partial_sums: [f32; 2],
 }
 
@@ -71,8 +77,8 @@ impl SubpathPdfs {
         self.vertices.push(VertexPdfs::origin(origin));
     }
 
-    /// The walk arrived at `vertex` from a vertex that is not a light's; `survival` is the survival there of a walk from the other end.
-    /// Returns p_fwd.
+    /// The walk arrived at `vertex` from a vertex that is not a light's; `survival` is the survival there of a walk
+    /// from the other end. Returns p_fwd.
     #[inline]
     pub fn arrive(&mut self, vertex: &Vertex, survival: f32) -> AreaPdf {
         let (edge, cos) = (vertex.edge, vertex.place.cosine(vertex.wo));
@@ -82,8 +88,8 @@ impl SubpathPdfs {
         pdf_fwd
     }
 
-    /// The walk left the scene. A vertex at infinity has a density per steradian, and only the tilt of the vertex before spreads the disk
-    /// that emission from there starts on.
+    /// The walk left the scene. A vertex at infinity has a density per steradian, and only the tilt of the vertex
+    /// before spreads the disk that emission from there starts on.
     pub fn arrive_at_infinity(&mut self, edge: &Edge) {
         self.arrive_with(AreaPdf(edge.pdf_with_survival().0), self.cos_leaving.abs(), 1.0);
     }
@@ -94,9 +100,9 @@ impl SubpathPdfs {
         self.vertices.push(VertexPdfs::new(pdf_fwd, area_jacobian, survival));
     }
 
-    /// The walk leaves its last vertex, `vertex`, by `sample`; `reverse_mode` is the transport mode of a walk from the other end. Returns the
-    /// density per steradian there of the direction back, given the one the walk goes on in (of a delta event the discrete probability of
-    /// the reverse event).
+    /// The walk leaves its last vertex, `vertex`, by `sample`; `reverse_mode` is the transport mode of a walk from the
+    /// other end. Returns the density per steradian there of the direction back, given the one the walk goes on in (of
+    /// a delta event the discrete probability of the reverse event).
     #[inline]
     pub fn leave(
         &mut self,
@@ -148,7 +154,8 @@ impl SubpathPdfs {
     }
 }
 
-/// The values and densities that light on its way up an eye sub-path would meet at one of its vertices. Connection factors ask for them.
+/// The values and densities that light on its way up an eye sub-path would meet at one of its vertices. Connection
+/// factors ask for them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReverseTransport {
     /// |cos| between the surface's normal and the edge to the vertex before.
@@ -208,8 +215,8 @@ impl<F: ConnectionFactor> EyeSubpathPdfs<F> {
         self.push(0.0, 0.0);
     }
 
-    /// Notes at the last vertex the value and density of light on its way back, and what the factor of the edge to the vertex before depends
-    /// on.
+    /// Notes at the last vertex the value and density of light on its way back, and what the factor of the edge to the
+    /// vertex before depends on.
     #[inline]
     pub fn set_reverse(&mut self, value: Rgb, pdf: SolidAnglePdf, edge: F::Edge) {
         if let (Some(last), Some(last_edge)) = (self.reverse.last_mut(), self.edges.last_mut()) {

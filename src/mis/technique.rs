@@ -63,8 +63,8 @@ impl Techniques {
     }
 
     fn note_regularity(&mut self) {
-        // t = 0 is not a technique, t = 1 one of its own, and lights as such are not told from others by what weights ask: (0, 1) and
-        // (1, 1) stand apart.
+        // t = 0 is not a technique, t = 1 one of its own, and lights as such are not told from others by what weights
+        // ask: (0, 1) and (1, 1) stand apart.
         let alike = |words: &[u64], mask: u64| {
             words.iter().all(|w| w & mask == words[0] & mask && (w & mask == 0 || w & mask == mask))
         };
@@ -75,16 +75,16 @@ impl Techniques {
             && alike(&self.on[2..], 0b10);
     }
 
-    /// Techniques of a kind are all used or none of them: hits of lights, next event (t ≥ 2 for both), connections, splats of surfaces
-    /// (s ≥ 2 for both).
+    /// Techniques of a kind are all used or none of them: hits of lights, next event (t ≥ 2 for both), connections,
+    /// splats of surfaces (s ≥ 2 for both).
     #[inline]
     pub fn regular(&self) -> bool {
         self.regular
     }
 
-    /// From text: items separated by commas, each taking effect on what stands before it. `all` and `none` set every technique;
-    /// `s:t`, with numbers or `*`, switches on, and with a minus sign off. A list that begins with a technique to switch on starts
-    /// from none, any other from all.
+    /// From text: items separated by commas, each taking effect on what stands before it. `all` and `none` set every
+    /// technique; `s:t`, with numbers or `*`, switches on, and with a minus sign off. A list that begins with a
+    /// technique to switch on starts from none, any other from all.
     ///
     /// # Errors
     /// If the text is something else.
@@ -111,8 +111,8 @@ impl Techniques {
         Ok(set)
     }
 
-    /// n_{s,t}, the samples that the technique takes of every pixel; 0 if it is switched off. Light sub-paths never hit a lens by
-    /// chance: t = 0 is not a technique.
+    /// n_{s,t}, the samples that the technique takes of every pixel; 0 if it is switched off. Light sub-paths never hit
+    /// a lens by chance: t = 0 is not a technique.
     #[inline]
     pub fn count(&self, s: usize, t: usize) -> f32 {
         let bit = self.on[s.min(SIDES - 1)] >> t.min(SIDES - 1) & 1;

@@ -1,19 +1,20 @@
 //! The weight of one sampled path among all techniques that make it.
 //!
-//! A path x̄ = v_0 … v_k with v_0 on a light and v_k on the lens is made by the techniques (s, k + 1 − s). Each takes n_s samples with the
-//! density p_s = Π_{i<s} p_L(v_i) · Π_{i≥s} p_E(v_i) times a factor c_s, and gets the weight
+//! A path x̄ = v_0 … v_k with v_0 on a light and v_k on the lens is made by the techniques (s, k + 1 − s). Each takes
+//! n_s samples with the density p_s = Π_{i<s} p_L(v_i) · Π_{i≥s} p_E(v_i) times a factor c_s, and gets the weight
 //!
 //! w_s = (n_s c_s p_s)^β / Σ_i (n_i c_i p_i)^β   (Veach 1997, eqs. 9.8 and 10.9).
 //!
-//! Neighbours differ by one vertex, p_{s+1} / p_s = p_L(v_s) / p_E(v_s), so the sum is taken over products of the ratios that the two
-//! [`SubpathPdfs`](super::SubpathPdfs) keep, going outwards from the connection. Only four ratios depend on the connection itself: those
-//! of its two end vertices and of the two vertices behind them. The terms of techniques farther out are summed up once, as the sub-path is
-//! made ([`MisContext::accumulate_partial_sums`]), so that a connection costs the same for sub-paths of any length.
+//! Neighbours differ by one vertex, p_{s+1} / p_s = p_L(v_s) / p_E(v_s), so the sum is taken over products of the
+//! ratios that the two [`SubpathPdfs`](super::SubpathPdfs) keep, going outwards from the connection. Only four ratios
+//! depend on the connection itself: those of its two end vertices and of the two vertices behind them. The terms of
+//! techniques farther out are summed up once, as the sub-path is made ([`MisContext::accumulate_partial_sums`]), so
+//! that a connection costs the same for sub-paths of any length.
 //!
-//! Factors: c_0 = 0 if no ray can meet the light by chance; c_1 = p_direct(v_0 | v_1) / p_L(v_0) where t ≥ 2, since those techniques
-//! draw their light point as seen from v_1 (*next event*) and not as light sub-paths do; c of connections is a [`ConnectionFactor`]; all others
-//! are 1, or 0 if an end of the connection is a delta event. Roulette is part of the densities: its first vertex is counted from the end that
-//! walks.
+//! Factors: c_0 = 0 if no ray can meet the light by chance; c_1 = p_direct(v_0 | v_1) / p_L(v_0) where t ≥ 2, since
+//! those techniques draw their light point as seen from v_1 (*next event*) and not as light sub-paths do; c of
+//! connections is a [`ConnectionFactor`]; all others are 1, or 0 if an end of the connection is a delta event. Roulette
+//! is part of the densities: its first vertex is counted from the end that walks.
 
 use super::factor::{ConnectionFactor, IncidentSubpath, ResamplingTarget};
 use super::pdfs::{ReverseTransport, VertexPdfs};
@@ -26,8 +27,8 @@ use crate::path::{PathLimits, ScatterSampler};
 pub struct EndpointPdfs {
     /// Area density of the last vertex, survival at the other sub-path's last vertex included.
     pub pdf_rev: AreaPdf,
-    /// Density per steradian at the last vertex of the direction to the vertex before it. (For a light that was hit: its emission's density
-    /// of direction; of a light at infinity: the density of its disk.)
+    /// Density per steradian at the last vertex of the direction to the vertex before it. (For a light that was hit:
+    /// its emission's density of direction; of a light at infinity: the density of its disk.)
     pub pdf_rev_prev: SolidAnglePdf,
 }
 
@@ -45,8 +46,9 @@ pub struct EmitterFactors {
     pub next_event: f32,
 }
 
-/// c_1 of a light with extent: the density per steradian with which next event draws its point from the next vertex, over the area density
-/// `origin` with which light sub-paths begin there; `area_jacobian` turns the one measure into the other.
+/// c_1 of a light with extent: the density per steradian with which next event draws its point from the next vertex,
+/// over the area density `origin` with which light sub-paths begin there; `area_jacobian` turns the one measure into
+/// the other.
 #[inline]
 pub fn next_event_factor(direct: SolidAnglePdf, area_jacobian: f32, origin: AreaPdf) -> f32 {
     direct.0 * area_jacobian / origin.0
@@ -169,13 +171,13 @@ impl<F: ConnectionFactor> MisContext<F> {
         self.techniques.regular() && (light || F::IS_ONE)
     }
 
-    /// Sums up, once a walk has left v_i, the last of `vertices`, the effective densities of the techniques that use n ≤ i of its vertices,
-    /// each relative to the density of the one that uses i of them, counted once:
+    /// Sums up, once a walk has left v_i, the last of `vertices`, the effective densities of the techniques that use n
+    /// ≤ i of its vertices, each relative to the density of the one that uses i of them, counted once:
     ///
     /// S_i = (n c)(i) + (p_rev / p_fwd)(v_{i−1}) S_{i−1}.
     ///
-    /// There are two sums, of connections and of all others, which are of one group on each sub-path. Roulette is taken as played at all
-    /// these vertices; where S_i is used, it is.
+    /// There are two sums, of connections and of all others, which are of one group on each sub-path. Roulette is taken
+    /// as played at all these vertices; where S_i is used, it is.
     #[inline]
     pub fn accumulate_partial_sums(&self, vertices: &mut [VertexPdfs], end: PathEnd) {
         if !self.has_partial_sums(matches!(end, PathEnd::Light(_))) {
@@ -204,9 +206,10 @@ impl<F: ConnectionFactor> MisContext<F> {
         vertices[i].partial_sums = sums;
     }
 
-    /// Adds to `sums`, by group, the effective densities of the techniques that have fewer than all vertices of `subpath`, relative to the
-    /// density of the technique that has all of them; `other` is the number of vertices of the other sub-path, `term(n)` the technique with n
-    /// vertices of this one. `partial` is the group of the partial sums beside connections, where these exist.
+    /// Adds to `sums`, by group, the effective densities of the techniques that have fewer than all vertices of
+    /// `subpath`, relative to the density of the technique that has all of them; `other` is the number of vertices of
+    /// the other sub-path, `term(n)` the technique with n vertices of this one. `partial` is the group of the partial
+    /// sums beside connections, where these exist.
     #[inline]
     fn add_outward(
         &self,
@@ -257,8 +260,8 @@ impl<F: ConnectionFactor> MisContext<F> {
         }
     }
 
-    /// c of the technique with n eye vertices, asked for from the connection outwards: `throughput` is β_L of light on its way up the eye
-    /// sub-path, on arriving at z_n, and is carried on to z_{n−1}.
+    /// c of the technique with n eye vertices, asked for from the connection outwards: `throughput` is β_L of light on
+    /// its way up the eye sub-path, on arriving at z_n, and is carried on to z_{n−1}.
     fn eye_factor(&self, path: &ConnectedPath<F>, n: usize, throughput: &mut Rgb) -> f32 {
         let (eye, s) = (path.eye, path.light.len());
         let (t, vertex, reverse) = (eye.len(), &eye[n], &path.reverse.vertices[n]);

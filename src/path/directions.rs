@@ -1,7 +1,8 @@
 //! Where a walk goes on: the one source of scattered directions and of their densities.
 //!
-//! A density of directions enters the walk, the densities of the walk from the other end, and the weights of connections. All three ask
-//! the same [`DirectionSampler`], so that a sampler that mixes the scattering function with a guide changes one place.
+//! A density of directions enters the walk, the densities of the walk from the other end, and the weights of
+//! connections. All three ask the same [`DirectionSampler`], so that a sampler that mixes the scattering function with
+//! a guide changes one place.
 
 use super::vertex::{Scatter, Scattering};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};

@@ -16,8 +16,8 @@ pub struct Interior {
     pub bsdf: Bsdf,
     /// The normal that the choice of a light may use here.
     pub light_choice_normal: Option<Vec3>,
-    /// Delta events only: the discrete probabilities of going on towards the lens when coming from the light, and the reverse; and the
-    /// value for light that goes on towards the lens.
+    /// Delta events only: the discrete probabilities of going on towards the lens when coming from the light, and the
+    /// reverse; and the value for light that goes on towards the lens.
     pub delta: Option<([SolidAnglePdf; 2], Rgb)>,
 }
 
@@ -42,7 +42,8 @@ pub struct Origin {
     pub end: EmitterVertex,
     /// Unit direction that leaves v_0.
     pub direction: Vec3,
-    /// β_L at v_1 of a light sub-path that begins like this: emission and its cosine over the densities of v_0 and of the direction.
+    /// β_L at v_1 of a light sub-path that begins like this: emission and its cosine over the densities of v_0 and of
+    /// the direction.
     pub throughput: Rgb,
 }
 

@@ -12,8 +12,8 @@ pub struct Iteration<'a> {
     pub seed: u64,
     /// Number of the iteration, from zero.
     pub index: u64,
-    /// Time of the iteration in the shutter interval [0, 1). Light vertices are shared by all pixels, so that all paths of an iteration have
-    /// one time.
+    /// Time of the iteration in the shutter interval [0, 1). Light vertices are shared by all pixels, so that all paths
+    /// of an iteration have one time.
     pub time: f32,
 }
 

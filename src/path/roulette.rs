@@ -1,7 +1,8 @@
 //! How long a sub-path may be: a limit on its edges, and Russian roulette.
 //!
-//! Roulette starts at a vertex index counted from the sub-path's own origin and survives with a probability that depends on the vertex
-//! alone (its albedo, not the throughput), so that the density of a path is known from either of its ends.
+//! Roulette starts at a vertex index counted from the sub-path's own origin and survives with a probability that
+//! depends on the vertex alone (its albedo, not the throughput), so that the density of a path is known from either of
+//! its ends.
 
 use super::vertex::Scatter;
 use crate::math::Rgb;

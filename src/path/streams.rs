@@ -1,7 +1,9 @@
-//! Random streams: every use of random numbers in the program has a stream of its own, so that no two uses are correlated.
+//! Random streams: every use of random numbers in the program has a stream of its own, so that no two uses are
+//! correlated.
 //!
 //! A stream is the second argument of [`PathSampler::new`](crate::math::sampler::PathSampler::new) and of
-//! [`HashRng::new`](crate::math::hash::HashRng::new). Bits 32 and above are free for a number that tells sets of one use apart.
+//! [`HashRng::new`](crate::math::hash::HashRng::new). Bits 32 and above are free for a number that tells sets of one
+//! use apart.
 
 /// Eye sub-paths of bidirectional methods.
 pub const EYE: u64 = 1;
@@ -17,7 +19,8 @@ pub const WARM_UP: u64 = 5;
 pub const FIRST_STAGE: u64 = 6;
 /// Which pixels share a light sub-path.
 pub const ASSIGNMENT: u64 = 7;
-/// Paths of the path tracer. They are not the eye sub-paths of bidirectional methods, so that renders of both with one seed are independent.
+/// Paths of the path tracer. They are not the eye sub-paths of bidirectional methods, so that renders of both with one
+/// seed are independent.
 pub const PATH: u64 = 8;
 
 /// Every stream with its name.

@@ -69,7 +69,8 @@ impl StoredPlace {
         }
     }
 
-    /// Cosine between the unit direction `d` and the geometric normal, the factor of a geometry term at this end of an edge; 1 in a medium.
+    /// Cosine between the unit direction `d` and the geometric normal, the factor of a geometry term at this end of an
+    /// edge; 1 in a medium.
     #[inline]
     pub fn cosine(&self, d: Vec3) -> f32 {
         match self {
@@ -78,8 +79,9 @@ impl StoredPlace {
         }
     }
 
-    /// Turns a density per steradian at a point a distance √`distance2` away in the unit direction `d` into the density per unit area (in a
-    /// medium: volume) of this place: |cos| / d² on a surface, 1 / d² in a medium (Veach 1997, eq. 8.8).
+    /// Turns a density per steradian at a point a distance √`distance2` away in the unit direction `d` into the density
+    /// per unit area (in a medium: volume) of this place: |cos| / d² on a surface, 1 / d² in a medium (Veach 1997, eq.
+    /// 8.8).
     #[inline]
     pub fn area_jacobian(&self, d: Vec3, distance2: f32) -> f32 {
         area_jacobian(self.cosine(d), distance2)
@@ -100,8 +102,9 @@ impl StoredPlace {
         }
     }
 
-    /// Distance of a point at the given offset from the place's tangent plane, and the bound on the error of the place's own coordinates:
-    /// a point within the errors of both is on neither side. `None` in a medium, which has no plane.
+    /// Distance of a point at the given offset from the place's tangent plane, and the bound on the error of the
+    /// place's own coordinates: a point within the errors of both is on neither side. `None` in a medium, which has no
+    /// plane.
     #[inline]
     pub fn height(&self, offset: Vec3) -> Option<(f32, f32)> {
         match *self {
@@ -268,7 +271,8 @@ pub struct Vertex<'a> {
     pub scatter: Scatter<'a>,
     /// Unit direction back to the vertex before.
     pub wo: Vec3,
-    /// Throughput up to this vertex: all factors of the measurement contribution that the walk has passed, divided by its density.
+    /// Throughput up to this vertex: all factors of the measurement contribution that the walk has passed, divided by
+    /// its density.
     pub throughput: Rgb,
     /// How it was reached.
     pub edge: &'a Edge,
@@ -281,8 +285,8 @@ impl Vertex<'_> {
         self.place.position()
     }
 
-    /// The normal that the choice of a light may use here: the shading normal on the side of `wo`, none where light from behind
-    /// contributes.
+    /// The normal that the choice of a light may use here: the shading normal on the side of `wo`, none where light
+    /// from behind contributes.
     #[inline]
     pub fn light_choice_normal(&self) -> Option<Vec3> {
         let Place::Surface { point, .. } = self.place else { return None };

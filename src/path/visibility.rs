@@ -1,7 +1,7 @@
 //! Visibility rays on their way: contributions wait here until sixteen segments fill a packet.
 //!
-//! A contribution never steers the walk, so it may arrive late. Each entry knows where it goes; entries leave in the order they came,
-//! so sums do not depend on how packets were filled.
+//! A contribution never steers the walk, so it may arrive late. Each entry knows where it goes; entries leave in the
+//! order they came, so sums do not depend on how packets were filled.
 
 use crate::emit::DirectSample;
 use crate::math::Rgb;
@@ -11,8 +11,8 @@ use std::ops::Mul;
 
 /// The share of light that passes a segment, by which a contribution is multiplied on arrival.
 ///
-/// Without media and partly transparent surfaces a segment that nothing blocks lets all light pass. That is the only value today: the
-/// type is empty, and multiplying by it costs nothing.
+/// Without media and partly transparent surfaces a segment that nothing blocks lets all light pass. That is the only
+/// value today: the type is empty, and multiplying by it costs nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Transmittance(());
 
@@ -52,8 +52,8 @@ impl<T: Copy + Default> ShadowQueue<T> {
         ShadowQueue { kind, packet: SegmentPacket::default(), payloads: [T::default(); PACKET] }
     }
 
-    /// Queues a segment with its payload; sends the packet off when it is full. `arrived` gets the payloads of segments that nothing
-    /// blocks, with the transmittance of the segment.
+    /// Queues a segment with its payload; sends the packet off when it is full. `arrived` gets the payloads of segments
+    /// that nothing blocks, with the transmittance of the segment.
     #[inline]
     pub fn push(&mut self, segment: &Segment, payload: T, tracer: &mut Tracer, arrived: impl FnMut(T, Transmittance)) {
         self.payloads[self.packet.len] = payload;

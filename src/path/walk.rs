@@ -1,7 +1,8 @@
 //! The random walk: the only bounce loop of the program.
 //!
-//! From an origin it traces, resolves the vertex, shows it to the hooks, draws the next direction from the direction sampler and plays
-//! Russian roulette, until a limit, a miss or a hook ends it. [`Transport`] says whether it carries radiance or importance.
+//! From an origin it traces, resolves the vertex, shows it to the hooks, draws the next direction from the direction
+//! sampler and plays Russian roulette, until a limit, a miss or a hook ends it. [`Transport`] says whether it carries
+//! radiance or importance.
 
 use super::directions::DirectionSampler;
 use super::iteration::Iteration;
@@ -36,8 +37,8 @@ pub struct CameraStart {
 }
 
 impl WalkStart {
-    /// Draws the camera ray of a sample of the pixel (x, y): a point of the pixel's filter and a point of the lens, by the first four
-    /// numbers of `sampler`. The throughput is the filter's weight.
+    /// Draws the camera ray of a sample of the pixel (x, y): a point of the pixel's filter and a point of the lens, by
+    /// the first four numbers of `sampler`. The throughput is the filter's weight.
     #[inline]
     pub fn from_camera(iteration: &Iteration, (x, y): (u32, u32), sampler: &mut PathSampler) -> CameraStart {
         let scene = iteration.scene;
@@ -72,7 +73,8 @@ pub trait WalkHooks {
     #[inline]
     fn leaving(&mut self, _vertex: &Vertex, _sample: &BsdfSample) {}
 
-    /// The ray left the scene in the unit direction `direction`; `throughput` and `edge` as for a vertex that would be there.
+    /// The ray left the scene in the unit direction `direction`; `throughput` and `edge` as for a vertex that would be
+    /// there.
     fn escaped(&mut self, index: u32, direction: Vec3, throughput: Rgb, edge: &Edge);
 }
 

@@ -33,8 +33,9 @@ impl MeshShading {
         self.normals.len() * 12 + self.uvs.len() * 8 + self.colors.len() * 12
     }
 
-    /// Fills in the shading normal (as `frame.n`), texture coordinates, their derivatives and the colour of the point with barycentrics
-    /// `b` on the triangle with vertex indices `i`. The point holds the triangle's edges v1 − v0 and v2 − v0 as derivatives.
+    /// Fills in the shading normal (as `frame.n`), texture coordinates, their derivatives and the colour of the point
+    /// with barycentrics `b` on the triangle with vertex indices `i`. The point holds the triangle's edges v1 − v0 and
+    /// v2 − v0 as derivatives.
     #[inline]
     pub fn interpolate(&self, i: &[usize; 3], b: [f32; 3], point: &mut SurfacePoint) {
         if !self.normals.is_empty() {

@@ -1,8 +1,8 @@
 //! `SceneDesc` → [`PreparedScene`]: immutable, shared by all threads, in world space around the scene's centre.
 //!
-//! Preparing ([`build`]) places and cleans the triangles, moves everything so that the scene's centre is the origin (in double
-//! precision: far from the origin no single precision policy works), builds materials, lights and the ray-query backend, and
-//! notes which [`features`] the scene has, so that nobody pays for what it lacks.
+//! Preparing ([`build`]) places and cleans the triangles, moves everything so that the scene's centre is the origin (in
+//! double precision: far from the origin no single precision policy works), builds materials, lights and the ray-query
+//! backend, and notes which [`features`] the scene has, so that nobody pays for what it lacks.
 
 pub mod build;
 pub mod features;
@@ -66,7 +66,8 @@ impl PreparedScene {
         (point, material)
     }
 
-    /// [`PreparedScene::surface_point`] in place, for loops: moving what has just been written in pieces stalls the processor.
+    /// [`PreparedScene::surface_point`] in place, for loops: moving what has just been written in pieces stalls the
+    /// processor.
     #[inline]
     pub fn surface_point_into(&self, hit: &Hit, point: &mut SurfacePoint) -> &Material {
         let mesh = self.triangles.mesh(hit);
@@ -106,8 +107,8 @@ impl PreparedScene {
     fn place(&self, point: &mut SurfacePoint, instance: u32) {
         let m: &Affine3A = &self.geometry.instances[instance as usize].to_world;
         let normals = &self.instance_normals[instance as usize];
-        // The bound grows with the map's absolute values, and the map itself rounds; the backend rounds the ray into group space as
-        // well, which the last factor covers.
+        // The bound grows with the map's absolute values, and the map itself rounds; the backend rounds the ray into
+        // group space as well, which the last factor covers.
         let linear = m.matrix3;
         let absolute = Mat3A::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs()) * point.p.abs();
         let gain = (linear.x_axis.abs() + linear.y_axis.abs() + linear.z_axis.abs()).max_element();

@@ -1,4 +1,5 @@
-//! Meshes in their places: moved to the scene's centre in double precision, cleaned, and cut into what rays and what shading need.
+//! Meshes in their places: moved to the scene's centre in double precision, cleaned, and cut into what rays and what
+//! shading need.
 
 use super::MeshShading;
 use crate::math::{DVec3, Vec3};
@@ -67,8 +68,8 @@ fn emitter_in_group() -> Diagnostic {
     Diagnostic::warning("scene::emitter-in-group", "a shape of a shapegroup cannot emit; its light is ignored")
 }
 
-/// Names meshes of which triangles were removed. Validation names triangles that are flat in their file; here are those that were flattened by
-/// their place.
+/// Names meshes of which triangles were removed. Validation names triangles that are flat in their file; here are those
+/// that were flattened by their place.
 fn warn_of_flat_triangles(removed: Vec<(String, usize)>, diagnostics: &mut Diagnostics) {
     if diagnostics.list.iter().any(|d| d.code == "scene::flat-triangles") {
         return;
@@ -192,8 +193,8 @@ impl Placer {
     }
 }
 
-/// Moves a mesh to its place, drops triangles without area, and turns triangles so that their winding agrees with the vertex
-/// normals (the side of a surface is the side of its geometric normal everywhere after this).
+/// Moves a mesh to its place, drops triangles without area, and turns triangles so that their winding agrees with the
+/// vertex normals (the side of a surface is the side of its geometric normal everywhere after this).
 fn place(part: Part) -> (PlacedMesh, usize) {
     let Part { mut mesh, to_place, flip, material, surface, wants_tangents, wants_uvs, wants_colors } = part;
     if to_place != DMat4::IDENTITY {

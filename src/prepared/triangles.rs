@@ -1,7 +1,8 @@
 //! Triangles as hits look them up: one cache line each, found without going through the index and vertex buffers.
 //!
-//! A ray meets triangles in no order that a cache could learn, so what counts is the number of lines that a hit touches and how many
-//! of them must arrive one after the other. The corners and the normal of a triangle fill exactly one line.
+//! A ray meets triangles in no order that a cache could learn, so what counts is the number of lines that a hit touches
+//! and how many of them must arrive one after the other. The corners and the normal of a triangle fill exactly one
+//! line.
 
 use super::MeshShading;
 use crate::math::Vec3;

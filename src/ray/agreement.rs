@@ -1,4 +1,5 @@
-//! Do two backends give the same answers? Counted on random rays, so that every disagreement is seen and can be explained.
+//! Do two backends give the same answers? Counted on random rays, so that every disagreement is seen and can be
+//! explained.
 
 use super::{Ray, RayQuery, Segment, SegmentPacket, SurfaceMask};
 use crate::math::{Vec3, hash::HashRng, warp};
@@ -37,7 +38,8 @@ impl Agreement {
     }
 }
 
-/// Compares two backends on `count` random rays and as many segments between points of the box `bounds` and points that rays found.
+/// Compares two backends on `count` random rays and as many segments between points of the box `bounds` and points that
+/// rays found.
 pub fn compare(a: &dyn RayQuery, b: &dyn RayQuery, bounds: (Vec3, Vec3), count: u64, seed: u64) -> Agreement {
     let mut rng = HashRng::new(seed, 0xa9ee, 0, 0);
     let mut out = Agreement::default();
@@ -214,7 +216,8 @@ mod tests {
 
     #[test]
     fn no_ray_leaks_through_a_shared_edge() {
-        // A closed box of two triangles a side; rays from inside at random points of its edges' neighbourhood and along the axes.
+        // A closed box of two triangles a side; rays from inside at random points of its edges' neighbourhood and along
+        // the axes.
         let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2 & 1) as f32) - 0.5;
         let quads = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
         let triangles: Vec<[u32; 3]> =

@@ -1,4 +1,5 @@
-//! The oracle: every triangle against every ray, in double precision. Slow on purpose; nothing here is approximate but f64 itself.
+//! The oracle: every triangle against every ray, in double precision. Slow on purpose; nothing here is approximate but
+//! f64 itself.
 
 use super::geometry::Geometry;
 use super::{Hit, Ray, RayQuery, SurfaceMask};

@@ -1,8 +1,9 @@
 //! The Embree backend, and the only place with `unsafe` code.
 //!
-//! Embree 3 (Debian 12) and Embree 4 (Debian 13) differ in how a query passes its context and in a few sizes; all of that is
-//! in the module `version` below. Scenes are built with the ROBUST flag (no leaks at shared edges, and packets of any width give the
-//! answers of single rays) at medium quality; packets are never flagged coherent, which is slower.
+//! Embree 3 (Debian 12) and Embree 4 (Debian 13) differ in how a query passes its context and in a few sizes; all of
+//! that is in the module `version` below. Scenes are built with the ROBUST flag (no leaks at shared edges, and packets
+//! of any width give the answers of single rays) at medium quality; packets are never flagged coherent, which is
+//! slower.
 #![allow(unsafe_code)]
 
 use super::geometry::Geometry;
@@ -121,8 +122,8 @@ struct Device {
     errors: Box<ErrorSlot>,
 }
 
-// SAFETY: Embree's manual (§ "Embree API") says that API calls on a device are thread-safe unless they modify the same object; this
-// type only creates and queries, and modification happens through `&mut` or before the scene is shared.
+// SAFETY: Embree's manual (§ "Embree API") says that API calls on a device are thread-safe unless they modify the same
+// object; this type only creates and queries, and modification happens through `&mut` or before the scene is shared.
 unsafe impl Send for Device {}
 // SAFETY: as above.
 unsafe impl Sync for Device {}
@@ -189,8 +190,8 @@ pub struct EmbreeScene {
     geometry: Arc<Geometry>,
 }
 
-// SAFETY: queries on a committed scene are read-only and may run on any number of threads (Embree's manual, § "rtcIntersect1"); the
-// handles are never modified after `build`.
+// SAFETY: queries on a committed scene are read-only and may run on any number of threads (Embree's manual, §
+// "rtcIntersect1"); the handles are never modified after `build`.
 unsafe impl Send for EmbreeScene {}
 // SAFETY: as above.
 unsafe impl Sync for EmbreeScene {}
@@ -241,9 +242,10 @@ fn new_scene(device: &Device) -> SceneHandle {
 
 fn attach_mesh(device: &Device, scene: &SceneHandle, geometry: &Geometry, mesh: u32, id: u32) {
     let buffers = &geometry.meshes[mesh as usize];
-    // SAFETY: device and scene are alive. The buffers are owned by the `Geometry` that the finished `EmbreeScene` holds, are never
-    // moved or written, hold one spare vertex behind the last (`VertexBuffer`), and every index is in range by `MeshBuffers`' contract
-    // (Embree drops a triangle whose index is not). The geometry handle is released after the scene holds its own reference.
+    // SAFETY: device and scene are alive. The buffers are owned by the `Geometry` that the finished `EmbreeScene`
+    // holds, are never moved or written, hold one spare vertex behind the last (`VertexBuffer`), and every index is in
+    // range by `MeshBuffers`' contract (Embree drops a triangle whose index is not). The geometry handle is released
+    // after the scene holds its own reference.
     unsafe {
         let handle = rtcNewGeometry(device.raw, RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE);
         rtcSetSharedGeometryBuffer(
@@ -302,8 +304,8 @@ fn commit(scene: &SceneHandle) {
     unsafe { rtcCommitScene(scene.0) };
 }
 
-/// `RTCRay` as rows of four floats. Embree reads a ray in whole rows as soon as it is called: a row that was written piece by piece
-/// would have to wait until all its pieces have reached the cache.
+/// `RTCRay` as rows of four floats. Embree reads a ray in whole rows as soon as it is called: a row that was written
+/// piece by piece would have to wait until all its pieces have reached the cache.
 #[repr(C, align(16))]
 struct RayRows {
     o_near: Vec4,
@@ -344,8 +346,9 @@ impl EmbreeScene {
         let mut rows = RayHitRows { ray: raw_ray(ray, SurfaceMask::ALL), hit: RTCHit::default() };
         rows.hit.geomID = u32::MAX;
         rows.hit.instID = [u32::MAX];
-        // SAFETY: the scene is committed and alive, the ray is valid (checked by the caller, see `Ray::is_valid`). Both types are
-        // `repr(C)` with the same fields in the same places (sizes are checked above) and any bits are valid in either.
+        // SAFETY: the scene is committed and alive, the ray is valid (checked by the caller, see `Ray::is_valid`). Both
+        // types are `repr(C)` with the same fields in the same places (sizes are checked above) and any bits are valid
+        // in either.
         unsafe { version::intersect1(self.top.0, &mut *(&raw mut rows).cast::<RTCRayHit>()) };
         let hit = &rows.hit;
         if hit.geomID == u32::MAX {
@@ -415,7 +418,8 @@ impl RayQuery for EmbreeScene {
             id: [0; PACKET],
             flags: [0; PACKET],
         };
-        // The test of `Ray::is_valid`, lane by lane so that it vectorises; lanes that fail it or are not in use stay out.
+        // The test of `Ray::is_valid`, lane by lane so that it vectorises; lanes that fail it or are not in use stay
+        // out.
         let mut valid = Valid([0; PACKET]);
         for i in 0..PACKET {
             let sum = rays.org_x[i].abs()

@@ -4,8 +4,8 @@ use crate::math::Vec3;
 use glam::Affine3A;
 use std::ops::Deref;
 
-/// Vertex positions with one spare element behind the last: Embree reads four floats a vertex, and without the padding the last
-/// read leaves the allocation.
+/// Vertex positions with one spare element behind the last: Embree reads four floats a vertex, and without the padding
+/// the last read leaves the allocation.
 #[derive(Debug)]
 pub struct VertexBuffer {
     padded: Vec<Vec3>,

@@ -1,12 +1,13 @@
 //! Ray queries behind one trait: closest hit, occlusion of a segment, and occlusion in packets.
 //!
-//! Three backends answer the same questions: [`embree`] (Debian's Embree, the default and the only `unsafe` file), [`obvhs`] (pure
-//! Rust, for machines without Embree) and [`brute`] (every triangle in double precision, the tests' oracle). Integrators see
-//! none of them: they hold a [`Tracer`], which counts rays by kind and knows how long they took.
+//! Three backends answer the same questions: [`embree`] (Debian's Embree, the default and the only `unsafe` file),
+//! [`obvhs`] (pure Rust, for machines without Embree) and [`brute`] (every triangle in double precision, the tests'
+//! oracle). Integrators see none of them: they hold a [`Tracer`], which counts rays by kind and knows how long they
+//! took.
 //!
-//! Numerical policy: a ray leaves a surface from a point moved out by the error bound of the hit ([`offset`]), so the interval starts
-//! at the smallest positive number and, for a segment, ends one part in 2^23 before its far point. A ray with a component that is
-//! not finite is not traced: it is counted, and answered "miss" or "occluded".
+//! Numerical policy: a ray leaves a surface from a point moved out by the error bound of the hit ([`offset`]), so the
+//! interval starts at the smallest positive number and, for a segment, ends one part in 2^23 before its far point. A
+//! ray with a component that is not finite is not traced: it is counted, and answered "miss" or "occluded".
 
 pub mod agreement;
 pub mod brute;
@@ -176,8 +177,8 @@ pub trait RayQuery: Send + Sync {
     /// Is a surface of the kinds `blockers` in the ray's interval? The ray must be valid.
     fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool;
 
-    /// Bit `i` set: segment `i` of the packet is blocked by a surface of the kinds that the packet asks for. Segments that are not valid are reported blocked, with their number in
-    /// the second value.
+    /// Bit `i` set: segment `i` of the packet is blocked by a surface of the kinds that the packet asks for. Segments
+    /// that are not valid are reported blocked, with their number in the second value.
     fn occluded_packet(&self, packet: &SegmentPacket) -> (u16, u32) {
         let (mut mask, mut invalid) = (0, 0);
         for i in 0..packet.len {

@@ -1,9 +1,11 @@
-//! The pure-Rust backend: an eight-wide compressed tree (Ylitie et al. 2017, crate `obvhs`) around our own triangle test.
+//! The pure-Rust backend: an eight-wide compressed tree (Ylitie et al. 2017, crate `obvhs`) around our own triangle
+//! test.
 //!
-//! The crate's node test has absolute epsilons, so it works in a private space: the scene is centred and scaled by a power of two
-//! (exact in floating point) to a diagonal near 2¹², and directions are normalised. Leaf boxes are inflated by 2⁻²¹ of their largest
-//! coordinate, and the triangle test uses edge functions that are shared by neighbours (Plücker, Davidovič et al. 2012), so that a
-//! ray through a shared edge never slips between two triangles. Instances are flattened.
+//! The crate's node test has absolute epsilons, so it works in a private space: the scene is centred and scaled by a
+//! power of two (exact in floating point) to a diagonal near 2¹², and directions are normalised. Leaf boxes are
+//! inflated by 2⁻²¹ of their largest coordinate, and the triangle test uses edge functions that are shared by
+//! neighbours (Plücker, Davidovič et al. 2012), so that a ray through a shared edge never slips between two triangles.
+//! Instances are flattened.
 
 use super::geometry::Geometry;
 use super::{Hit, QueryError, Ray, RayQuery, SurfaceMask};
@@ -97,8 +99,8 @@ impl ObvhsScene {
     }
 }
 
-/// (t, u, v) of a hit in the ray's interval, else nothing. Edge functions are products of the edges' ends alone, so two triangles
-/// that share an edge compute the same number for it (with opposite sign), and none leaks between them.
+/// (t, u, v) of a hit in the ray's interval, else nothing. Edge functions are products of the edges' ends alone, so two
+/// triangles that share an edge compute the same number for it (with opposite sign), and none leaks between them.
 #[inline]
 fn intersect(corners: &Corners, ray: &TreeRay) -> Option<(f32, f32, f32)> {
     let (o, d) = (ray.origin, ray.direction);

@@ -1,24 +1,26 @@
 //! Where a ray leaves a surface from: outside the error bound of the hit point, never at a constant distance.
 //!
-//! A hit point is interpolated from the triangle's corners, so it is off the triangle's plane by at most γ(7)·Σ|b_i v_i| (Pharr,
-//! Jakob, Humphreys, "Physically Based Rendering", §6.8). The largest component serves for all three. Moving by that bound along the
-//! normal, with room for the rounding of the move itself, leaves no false self-hit and no leak at any scale of a scene that is centred.
+//! A hit point is interpolated from the triangle's corners, so it is off the triangle's plane by at most γ(7)·Σ|b_i
+//! v_i| (Pharr, Jakob, Humphreys, "Physically Based Rendering", §6.8). The largest component serves for all three.
+//! Moving by that bound along the normal, with room for the rounding of the move itself, leaves no false self-hit and
+//! no leak at any scale of a scene that is centred.
 
 use super::Segment;
 use crate::math::{Vec3, float::gamma};
 
 const SQRT_3: f32 = 1.732_050_8;
 
-/// Error bound of a point Σ b_i v_i interpolated between three corners v_i with weights b_i that sum to one, and of moving it off the
-/// surface: γ(7) for the point and two roundings for the move. `sum` is the largest component of Σ |b_i v_i|.
+/// Error bound of a point Σ b_i v_i interpolated between three corners v_i with weights b_i that sum to one, and of
+/// moving it off the surface: γ(7) for the point and two roundings for the move. `sum` is the largest component of Σ
+/// |b_i v_i|.
 #[inline]
 pub fn interpolation_error(sum: f32) -> f32 {
     gamma(9) * sum
 }
 
-/// Moves `p` off its surface to the side to which `towards` points. A box of half width `error` reaches √3 of it along a unit normal at
-/// most; that is less work than how far it reaches along `ng`. The sum is rounded as well, which the bound has room for
-/// (see [`interpolation_error`]): no step to the next float is needed.
+/// Moves `p` off its surface to the side to which `towards` points. A box of half width `error` reaches √3 of it along
+/// a unit normal at most; that is less work than how far it reaches along `ng`. The sum is rounded as well, which the
+/// bound has room for (see [`interpolation_error`]): no step to the next float is needed.
 #[inline]
 pub fn offset_point(p: Vec3, error: f32, ng: Vec3, towards: Vec3) -> Vec3 {
     p + ng * (error * SQRT_3).copysign(towards.dot(ng))

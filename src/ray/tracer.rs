@@ -1,12 +1,12 @@
 //! A thread's way to the rays: counts them by kind and estimates the time spent in them.
 //!
-//! Every query would cost more in clock reads than it may, so one call in a prime number is timed and the mean stands for the rest;
-//! the clock's own cost, measured once, is taken off.
+//! Every query would cost more in clock reads than it may, so one call in a prime number is timed and the mean stands
+//! for the rest; the clock's own cost, measured once, is taken off.
 //!
-//! The measured time is that of a query by itself: a reading of the clock waits for all that was begun before it, and nothing that
-//! comes later may begin. Between queries a processor overlaps both, so the sum is more than a profiler finds inside the backend
-//! (path tracing a Cornell box, 0.65 of the time against 0.43). The rays of `profile`'s replay, which overlap with each other alone, give
-//! the smaller number.
+//! The measured time is that of a query by itself: a reading of the clock waits for all that was begun before it, and
+//! nothing that comes later may begin. Between queries a processor overlaps both, so the sum is more than a profiler
+//! finds inside the backend (path tracing a Cornell box, 0.65 of the time against 0.43). The rays of `profile`'s
+//! replay, which overlap with each other alone, give the smaller number.
 
 #[cfg(any(embree3, embree4))]
 use super::embree::EmbreeScene;
@@ -83,7 +83,8 @@ const KINDS: usize = RayKind::ALL.len();
 /// One query in this many is timed; a prime, so that it does not keep step with the bounces of a path.
 const TIMED_ONE_IN: u32 = 509;
 
-/// Tracers made so far. Most make few queries: each begins to count elsewhere, so that all of their queries get their turn.
+/// Tracers made so far. Most make few queries: each begins to count elsewhere, so that all of their queries get their
+/// turn.
 static TRACERS: AtomicU32 = AtomicU32::new(0);
 
 /// Counters of one kind of ray.
@@ -105,8 +106,8 @@ impl KindStats {
     }
 }
 
-/// The time, from a clock that has just been read once before: so rarely used, its code and data are in no cache, and the first reading
-/// takes as long as a ray.
+/// The time, from a clock that has just been read once before: so rarely used, its code and data are in no cache, and
+/// the first reading takes as long as a ray.
 #[inline]
 fn warm_clock() -> Instant {
     std::hint::black_box(Instant::now());
@@ -247,8 +248,8 @@ fn closest_virtual(query: &dyn RayQuery, o: [f32; 3], d: [f32; 3], [t_min, t_max
 /// One thread's access to the backend.
 pub struct Tracer<'a> {
     query: &'a dyn RayQuery,
-    /// The query if it is Embree, which is called directly: a ray then goes from the registers it was made in to where Embree reads
-    /// it, and the hit comes back into registers.
+    /// The query if it is Embree, which is called directly: a ray then goes from the registers it was made in to where
+    /// Embree reads it, and the hit comes back into registers.
     #[cfg(any(embree3, embree4))]
     embree: Option<&'a EmbreeScene>,
     /// Counters so far.
@@ -309,7 +310,8 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// The closest hit when it is its turn to be timed. Apart and part by part, so that the way of all other rays stays in registers.
+    /// The closest hit when it is its turn to be timed. Apart and part by part, so that the way of all other rays stays
+    /// in registers.
     #[cold]
     #[inline(never)]
     fn closest_timed(&mut self, o: [f32; 3], d: [f32; 3], t: [f32; 2], kind: RayKind) -> Option<Hit> {
@@ -325,7 +327,8 @@ impl<'a> Tracer<'a> {
             return None;
         }
         self.stats.kinds[kind as usize].rays += 1;
-        // Part by part both ways: what is only ever passed by reference on this way must not be kept in memory on the other.
+        // Part by part both ways: what is only ever passed by reference on this way must not be kept in memory on the
+        // other.
         let (o, d, t) = ([ray.o.x, ray.o.y, ray.o.z], [ray.d.x, ray.d.y, ray.d.z], [ray.t_min, ray.t_max]);
         let hit = if self.should_time() {
             self.closest_timed(o, d, t, kind)

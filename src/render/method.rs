@@ -56,7 +56,8 @@ impl MethodRequest {
         Ok(Method { label: self.label.clone().unwrap_or_else(|| spec.name.into()), spec, params })
     }
 
-    /// The parameters of the request that have another name or word for the value now. None if the scene file names the integrator.
+    /// The parameters of the request that have another name or word for the value now. None if the scene file names the
+    /// integrator.
     ///
     /// # Errors
     /// If the integrator or a parameter does not exist.

@@ -1,7 +1,7 @@
 //! `SceneDesc`: everything a scene file says, as plain data in world coordinates of double precision.
 //!
-//! Arenas and typed ids, no reference counting: the loaders fill it, `prepared` consumes it. Defaults follow Mitsuba 3, whose
-//! files are read; each field says its unit where it has one.
+//! Arenas and typed ids, no reference counting: the loaders fill it, `prepared` consumes it. Defaults follow Mitsuba 3,
+//! whose files are read; each field says its unit where it has one.
 
 use super::bsdf::BsdfDesc;
 use super::diag::Span;

@@ -1,5 +1,5 @@
-//! The content of a scene file, as plain data with source spans ([`desc`], materials in [`bsdf`]), and what is wrong with it
-//! ([`diag`], [`validate`]). No acceleration structures, nothing that renders.
+//! The content of a scene file, as plain data with source spans ([`desc`], materials in [`bsdf`]), and what is wrong
+//! with it ([`diag`], [`validate`]). No acceleration structures, nothing that renders.
 
 pub mod bsdf;
 pub mod desc;

@@ -5,9 +5,9 @@ use super::diag::{Diagnostic, Diagnostics, Span};
 use glam::DMat4;
 use rayon::prelude::*;
 
-/// Checks `scene` and adds what is wrong to `out`: no sensor, no shapes, an empty film, a crop outside the film, vertices that are not
-/// finite, indices out of range and transforms that cannot be inverted are errors; a scene without light and triangles without
-/// area (which `prepared` leaves out) are warnings.
+/// Checks `scene` and adds what is wrong to `out`: no sensor, no shapes, an empty film, a crop outside the film,
+/// vertices that are not finite, indices out of range and transforms that cannot be inverted are errors; a scene
+/// without light and triangles without area (which `prepared` leaves out) are warnings.
 pub fn validate(scene: &SceneDesc, out: &mut Diagnostics) {
     sensors(scene, out);
     let all: Vec<&ShapeDesc> = scene.shapes.iter().chain(scene.groups.iter().flat_map(|g| &g.shapes)).collect();
@@ -71,7 +71,8 @@ fn transform(m: &DMat4, what: &str, span: Option<&Span>, out: &mut Diagnostics) 
     let problem = if !m.is_finite() {
         "is not finite"
     } else if m.row(3).abs_diff_eq(glam::DVec4::W, 1e-9) {
-        // The determinant alone says nothing: it is tiny for small scales. Compare it with what orthogonal axes of these lengths have.
+        // The determinant alone says nothing: it is tiny for small scales. Compare it with what orthogonal axes of
+        // these lengths have.
         let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis].map(|a| a.truncate().length());
         if m.determinant().abs() > 1e-10 * x * y * z { return } else { "cannot be inverted: it makes everything flat" }
     } else {

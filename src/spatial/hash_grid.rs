@@ -16,8 +16,8 @@ use std::ops::RangeInclusive;
 
 /// Buckets per point: more of them hold fewer points of other cells, but take more memory.
 const BUCKETS_PER_POINT: usize = 2;
-/// Fewest buckets: more than the cells of a run along x (three, up to six where coordinates are rounded coarsely), so that a
-/// run meets no bucket twice.
+/// Fewest buckets: more than the cells of a run along x (three, up to six where coordinates are rounded coarsely), so
+/// that a run meets no bucket twice.
 const MIN_BUCKETS: usize = 8;
 /// Most cells along an axis.
 const MAX_CELLS: f32 = (1 << 20) as f32;
@@ -134,8 +134,8 @@ impl HashGrid {
         }
     }
 
-    /// Largest difference of a coordinate between a point and a query that finds it. Squares of distances are rounded, and
-    /// those of the smallest numbers are zero: a margin over the radius covers both.
+    /// Largest difference of a coordinate between a point and a query that finds it. Squares of distances are rounded,
+    /// and those of the smallest numbers are zero: a margin over the radius covers both.
     #[inline]
     fn margin(&self) -> f32 {
         (self.radius * (1.0 + 1e-6)).max(1e-22)

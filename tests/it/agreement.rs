@@ -12,8 +12,9 @@ use std::f64::consts::PI;
 
 /// Samples per pixel and render; the error of most pixels is about one percent.
 const SPP: u64 = 64;
-/// Comparisons of one integrator that may fail at the first try. Of 10 to 24 comparisons of each integrator, two of `bdpt` do (the scene
-/// "instances", which fails against one and the same reference) and two of `importance-caching`, none of the others.
+/// Comparisons of one integrator that may fail at the first try. Of 10 to 24 comparisons of each integrator, two of
+/// `bdpt` do (the scene "instances", which fails against one and the same reference) and two of `importance-caching`,
+/// none of the others.
 const MAX_REPEATED: usize = 2;
 /// Renders that Mitsuba's means are made of.
 const MITSUBA_RENDERS: f64 = 32.0;
@@ -71,7 +72,8 @@ fn every_integrator_agrees_with_the_path_tracer() {
                 let picture = Picture::render(spec, &scene, &params, SPP, 250);
                 let (failed, compared) = repeated.entry(spec.name).or_default();
                 *compared += 1;
-                // So many comparisons fail by chance now and then. What is really different is so at four times the samples.
+                // So many comparisons fail by chance now and then. What is really different is so at four times the
+                // samples.
                 if let Some(difference) = picture.difference(&reference, tolerance) {
                     failed.push(format!("{name} ({heuristic}): {difference}"));
                     let closer = Picture::render(spec, &scene, &params, 4 * SPP, 1250);
@@ -191,7 +193,8 @@ fn a_constant_sky_lights_an_open_plane() {
 
 #[test]
 fn a_polygonal_light_follows_lamberts_formula() {
-    // A tilted rectangle; irradiance by the contour integral (Lambert 1760; Arvo 1995, "Applications of irradiance tensors", eq. 2.4).
+    // A tilted rectangle; irradiance by the contour integral (Lambert 1760; Arvo 1995, "Applications of irradiance
+    // tensors", eq. 2.4).
     for (scale, place) in
         [(DVec3::new(0.3, 0.2, 1.0), DVec3::new(0.5, 0.4, 1.5)), (DVec3::ONE, DVec3::new(-0.3, 0.2, 1.2))]
     {

@@ -1,6 +1,7 @@
-//! The rules of the architecture, enforced on the text of `src/`: rooms import only rooms before them, no integrator imports
-//! another, `unsafe` is in one file, only `app` prints, files stay short, code that reads files or command lines does not unwrap,
-//! and streams of random numbers are distinct. Comments, literals and code that is compiled for tests alone do not count.
+//! The rules of the architecture, enforced on the text of `src/`: rooms import only rooms before them, no integrator
+//! imports another, `unsafe` is in one file, only `app` prints, files stay short, code that reads files or command
+//! lines does not unwrap, and streams of random numbers are distinct. Comments, literals and code that is compiled for
+//! tests alone do not count.
 
 use crate::support::rust_source::{matches, mentioned_paths, tokens, without_tests};
 use std::collections::{BTreeMap, BTreeSet};

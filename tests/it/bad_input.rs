@@ -1,4 +1,5 @@
-//! Whatever is wrong with the input: the exit code, the place, what was expected, and an earlier picture left as it was.
+//! Whatever is wrong with the input: the exit code, the place, what was expected, and an earlier picture left as it
+//! was.
 
 use crate::support::program::{BOX, Run, Sandbox};
 
@@ -292,7 +293,8 @@ fn unwritable_output_folder() {
     let sandbox = Sandbox::new();
     std::fs::create_dir(sandbox.path("folder.png")).unwrap();
     for option in ["-o", "--stats", "--checkpoint"] {
-        // The kernel lets nobody, root included, create files in /proc. An endless render shows that this is found out before it.
+        // The kernel lets nobody, root included, create files in /proc. An endless render shows that this is found out
+        // before it.
         for bad in ["no/such/out.png", "/proc/out.png", "scene.xml/out.png", "folder.png"] {
             refused(&sandbox, &format!("scene.xml --spp 1000000000 {option} {bad}"), 3, &[bad]);
         }

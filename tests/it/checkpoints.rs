@@ -27,7 +27,8 @@ fn a_resumed_render_with_an_error_target_has_the_same_bits() {
         let whole = stats(&sandbox, "whole.json");
         let iterations = whole["iterations"].as_u64().unwrap();
         assert!(iterations >= 12, "{integrator}: {iterations} iterations need one estimate alone");
-        // Before the first estimate, with halves of unequal size, between two estimates, and when the target is reached.
+        // Before the first estimate, with halves of unequal size, between two estimates, and when the target is
+        // reached.
         for first in [2, 7, 10, iterations] {
             render(&format!("relmse=0.0025 --spp {first} --checkpoint c -o part.pfm"));
             if first < iterations {

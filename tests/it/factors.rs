@@ -1,11 +1,12 @@
 //! Connection factors against the empirical density of the light sub-paths that are drawn.
 //!
-//! Any weights that sum to one are unbiased, so no picture can show a wrong factor. Here light sub-paths are toys: prefix v occurs with the
-//! known density p(v), sets of M sub-paths are drawn many times, and one prefix is resampled from each set as the method does. The number of
-//! draws of v over N p(v) is the true c(v).
+//! Any weights that sum to one are unbiased, so no picture can show a wrong factor. Here light sub-paths are toys:
+//! prefix v occurs with the known density p(v), sets of M sub-paths are drawn many times, and one prefix is resampled
+//! from each set as the method does. The number of draws of v over N p(v) is the true c(v).
 //!
-//! The factors of the papers replace the sum over the other sub-paths of a set by its mean (Nabata et al. 2020, "Resampling-aware weighting
-//! functions", eq. 14). The tolerances are that approximation's errors for these toys: measured, rounded up. They go to zero as M grows.
+//! The factors of the papers replace the sum over the other sub-paths of a set by its mean (Nabata et al. 2020,
+//! "Resampling-aware weighting functions", eq. 14). The tolerances are that approximation's errors for these toys:
+//! measured, rounded up. They go to zero as M grows.
 
 use lightsieve::math::Rgb;
 use lightsieve::math::hash::HashRng;
@@ -60,7 +61,8 @@ fn error(truth: [f64; KINDS], c: impl Fn(usize) -> f64) -> f64 {
     (0..KINDS).map(|k| (c(k) / truth[k] - 1.0).abs()).fold(0.0, f64::max)
 }
 
-/// Checks a factor, and that wrong ones would be found: no factor, that of infinitely many sub-paths, and that of half as many.
+/// Checks a factor, and that wrong ones would be found: no factor, that of infinitely many sub-paths, and that of half
+/// as many.
 fn check(what: &str, truth: [f64; KINDS], tolerance: f64, c: impl Fn(usize, f64) -> f64, m: f64) {
     let own = error(truth, |k| c(k, m));
     println!("{what}: c is off by {own:.4}, allowed {tolerance}");
@@ -193,8 +195,8 @@ fn records_drawn_by_a_mixture_of_pmfs() {
     }
 }
 
-/// The max combination of k pmfs differs by at most a factor of k from their mean, which stands for it; over all sub-paths both sum up to
-/// one. k = 2 here: one by the light, and the uniform one.
+/// The max combination of k pmfs differs by at most a factor of k from their mean, which stands for it; over all
+/// sub-paths both sum up to one. k = 2 here: one by the light, and the uniform one.
 #[test]
 fn lengths_drawn_by_the_max_heuristic() {
     for m in [2usize, 8, 64] {

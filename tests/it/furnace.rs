@@ -90,9 +90,9 @@ const WHITE: [(&str, &str); 9] = [
     ),
 ];
 
-/// Materials that lose some light by their nature (single scattering, a base under a coat), with the mean of the whole picture, of
-/// which they cover only a part: measured once with the path tracer, standard error below 0.001. Burley's model is missing: it
-/// reflects more than it receives at grazing angles (1.07 where this cube shows most of that).
+/// Materials that lose some light by their nature (single scattering, a base under a coat), with the mean of the whole
+/// picture, of which they cover only a part: measured once with the path tracer, standard error below 0.001. Burley's
+/// model is missing: it reflects more than it receives at grazing angles (1.07 where this cube shows most of that).
 const OFF_WHITE: [(&str, &str, f64); 8] = [
     ("rough glass", r#"<bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf>"#, 0.9455),
     (
@@ -147,7 +147,8 @@ fn white_materials_vanish_in_a_white_world() {
         let scene = prepare(parse(&open(bsdf), &[]), Backend::default_available(), None);
         for spec in unbiased().filter(|s| takes(s, &scene)) {
             let picture = Picture::render(spec, &scene, &[], 64, 1);
-            // Stratified roulette with a survival near one goes wrong so rarely that few renders know of no variance at all.
+            // Stratified roulette with a survival near one goes wrong so rarely that few renders know of no variance at
+            // all.
             picture.assert_agrees(&Picture::constant(1.0, SIDE * SIDE), 0.005, &format!("{}: {name}", spec.name));
         }
     }

@@ -1,6 +1,6 @@
-//! Measures of error against values computed elsewhere: the simple ones with numpy 2 in f64 (and scipy), ꟻLIP with NVIDIA's
-//! flip-evaluator 1.7 (`evaluate(…, 'LDR', inputsRGB=False)` and `evaluate(…, 'HDR')`, default viewer). All on pictures of
-//! 64 x 48 pixels made by the formulas below, which use only operations that are exact or rounded once.
+//! Measures of error against values computed elsewhere: the simple ones with numpy 2 in f64 (and scipy), ꟻLIP with
+//! NVIDIA's flip-evaluator 1.7 (`evaluate(…, 'LDR', inputsRGB=False)` and `evaluate(…, 'HDR')`, default viewer). All on
+//! pictures of 64 x 48 pixels made by the formulas below, which use only operations that are exact or rounded once.
 
 use lightsieve::image::flip::{hdr_flip, ldr_flip};
 use lightsieve::image::metrics::pixel_errors;

@@ -224,7 +224,8 @@ fn exr_has_one_part_with_named_channels_and_metadata() {
 
 #[test]
 fn equal_pictures_give_equal_bytes() {
-    // The EXR encoder orders attributes by a hash that differs from call to call; twelve of them do not agree by chance.
+    // The EXR encoder orders attributes by a hash that differs from call to call; twelve of them do not agree by
+    // chance.
     let folder = tempfile::tempdir().unwrap();
     let mut files = Vec::new();
     for name in ["a.exr", "b.exr"] {

@@ -1,5 +1,5 @@
-//! Integration tests: the library and the program from outside, one module a topic. They are one crate, so that what they share
-//! is compiled and linked once.
+//! Integration tests: the library and the program from outside, one module a topic. They are one crate, so that what
+//! they share is compiled and linked once.
 
 mod agreement;
 mod architecture;

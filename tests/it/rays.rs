@@ -1,8 +1,8 @@
 //! The ray-query backends agree on every scene of the repository: hit or miss, distance, triangle, occlusion.
 //!
-//! Tolerances: a distance may differ by 1e-4 of itself, another triangle at the same distance is a tie (shared edges, coplanar
-//! surfaces), and of all questions at most one in ten thousand may be answered differently (rays that graze a surface or meet a
-//! vertex). Packets must answer as single rays do.
+//! Tolerances: a distance may differ by 1e-4 of itself, another triangle at the same distance is a tie (shared edges,
+//! coplanar surfaces), and of all questions at most one in ten thousand may be answered differently (rays that graze a
+//! surface or meet a vertex). Packets must answer as single rays do.
 
 use lightsieve::load::{LoadOptions, load_scene};
 use lightsieve::prepared::{PrepareOptions, PreparedScene};

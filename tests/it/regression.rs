@@ -1,4 +1,5 @@
-//! Traps that other renderers fell into (pbrt-v3 issue 229, pbrt-v4 issue 347 and others), and bugs found here: one test each.
+//! Traps that other renderers fell into (pbrt-v3 issue 229, pbrt-v4 issue 347 and others), and bugs found here: one
+//! test each.
 
 use crate::support::pictures::{Picture, parse, prepare, sampled_by_pixel, takes, unbiased};
 use lightsieve::ray::Backend;
@@ -181,8 +182,9 @@ fn the_rim_of_a_pixel_filter_is_finite() {
     }
 }
 
-/// The two faces of a thin sheet, a quarter of a millimetre apart some metres from the origin, both count. (Mitsuba 3.9.1 starts the
-/// next ray beyond the second face, a third of a millimetre off: there, such a sheet lets 1 − opacity through, not its square.)
+/// The two faces of a thin sheet, a quarter of a millimetre apart some metres from the origin, both count. (Mitsuba
+/// 3.9.1 starts the next ray beyond the second face, a third of a millimetre off: there, such a sheet lets 1 − opacity
+/// through, not its square.)
 #[test]
 fn the_second_face_of_a_thin_sheet_is_not_skipped() {
     let sheet = |z: f32| {

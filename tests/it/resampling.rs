@@ -1,5 +1,6 @@
-//! Resampled connections agree with the path tracer whatever their parameters are: few or many light sub-paths, no cache points or
-//! three, one vertex in the second stage or all, any weights. So do connections to a light sub-path that pixels share, of which few are made.
+//! Resampled connections agree with the path tracer whatever their parameters are: few or many light sub-paths, no
+//! cache points or three, one vertex in the second stage or all, any weights. So do connections to a light sub-path
+//! that pixels share, of which few are made.
 
 use crate::support::gallery::{GALLERY, exhibit};
 use crate::support::pictures::{Picture, prepare};
@@ -117,8 +118,9 @@ fn parameters_do_not_change_the_expectation() {
     }
 }
 
-/// Knowledge from earlier iterations changes no expectation, and adds no noise that would not average out: the variance of the mean
-/// is a straight line in logarithms, and where it has become small the mean is still that of the path tracer.
+/// Knowledge from earlier iterations changes no expectation, and adds no noise that would not average out: the variance
+/// of the mean is a straight line in logarithms, and where it has become small the mean is still that of the path
+/// tracer.
 #[test]
 fn variance_falls_with_the_number_of_iterations_and_the_mean_stays() {
     let scene = prepare(exhibit("room"), Backend::default_available(), None);
@@ -137,8 +139,8 @@ fn variance_falls_with_the_number_of_iterations_and_the_mean_stays() {
         let levels: Vec<f64> = variances.iter().zip(counts).map(|(v, n)| (v * n as f64).ln()).collect();
         let mean = levels.iter().sum::<f64>() / levels.len() as f64;
         for (level, n) in levels.iter().zip(counts) {
-            // At most 0.17 with these seeds, by which variance falls a little faster than 1 / n: estimates of early iterations are
-            // poorer. A variance that stood still would be off by ln 4.
+            // At most 0.17 with these seeds, by which variance falls a little faster than 1 / n: estimates of early
+            // iterations are poorer. A variance that stood still would be off by ln 4.
             assert!((level - mean).abs() < 0.25, "{}: {n} iterations, {levels:?}", spec.name);
         }
         pictures[2].assert_agrees(&reference, 0.0, &format!("{} after {} iterations", spec.name, counts[2]));

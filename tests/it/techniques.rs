@@ -1,5 +1,5 @@
-//! Bidirectional techniques one by one: each makes the same picture of every path length, together they make the picture, and the
-//! light image does not depend on threads, windows or interruptions.
+//! Bidirectional techniques one by one: each makes the same picture of every path length, together they make the
+//! picture, and the light image does not depend on threads, windows or interruptions.
 
 use crate::support::gallery::{GALLERY, exhibit};
 use crate::support::methods::{bidirectional_methods, declared};
@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 
 fn build(spec: &'static IntegratorSpec, params: &[(&str, &str)]) -> Box<dyn Integrator> {
     let mut values = Params::defaults(spec);
-    // The allocation is decided by the picture, of which a crop sees only a part, and leaves few samples of some techniques.
+    // The allocation is decided by the picture, of which a crop sees only a part, and leaves few samples of some
+    // techniques.
     if spec.params().any(|p| p.name == "allocation") {
         values.set("allocation", "full").unwrap();
     }
@@ -81,9 +82,10 @@ type Values = [(&'static str, &'static str)];
 
 /// Parameters that suit the gallery, of those that a method has.
 ///
-/// With few light sub-paths no vertex is rarely drawn. Cache points on any surface may not see a light vertex that an eye vertex sees: each
-/// technique alone then has rare and bright samples, the more light sub-paths the rarer, and its error is not known from a few renders
-/// (`ris` with 100 sub-paths: -18 % of a block at 256 spp by ten times the estimated error, within it at 8192 spp).
+/// With few light sub-paths no vertex is rarely drawn. Cache points on any surface may not see a light vertex that an
+/// eye vertex sees: each technique alone then has rare and bright samples, the more light sub-paths the rarer, and its
+/// error is not known from a few renders (`ris` with 100 sub-paths: -18 % of a block at 256 spp by ten times the
+/// estimated error, within it at 8192 spp).
 const SMALL_SCENE: &Values = &[
     ("presampled_paths", "7"),
     // A film of 64 pixels needs more than its share of cache points and records.
@@ -108,8 +110,9 @@ fn small_scene(spec: &IntegratorSpec, other: &Values) -> Vec<(&'static str, &'st
     kept.chain(other.iter().copied()).collect()
 }
 
-/// Largest error of a block's mean, relative to the reference, with which it is compared. A mean that hangs on a few lucky paths has no
-/// honest error: of `bdpt`'s means with an error between 5 and 10 %, the average is half a standard error too low.
+/// Largest error of a block's mean, relative to the reference, with which it is compared. A mean that hangs on a few
+/// lucky paths has no honest error: of `bdpt`'s means with an error between 5 and 10 %, the average is half a standard
+/// error too low.
 const MAX_ERROR: f64 = 0.05;
 
 /// Blocks that are compared, and all that there are.

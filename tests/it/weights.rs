@@ -1,5 +1,5 @@
-//! Weights of sampled paths against their definition, for every technique, any subset of techniques, and scenes with every
-//! feature: they sum to one, the fast ones are the slow ones, and they depend on nothing that they should not.
+//! Weights of sampled paths against their definition, for every technique, any subset of techniques, and scenes with
+//! every feature: they sum to one, the fast ones are the slow ones, and they depend on nothing that they should not.
 
 use crate::support::gallery::{GALLERY, exhibit};
 use crate::support::methods::{bidirectional_methods, for_small_scenes};
@@ -53,8 +53,8 @@ fn context(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, rr_dep
     }
 }
 
-/// How far the rounding of positions, from which the definition computes directions and cosines anew, changes these: it counts on short
-/// edges and at grazing angles.
+/// How far the rounding of positions, from which the definition computes directions and cosines anew, changes these: it
+/// counts on short edges and at grazing angles.
 fn rounding(path: &FullPath) -> f64 {
     let normal = |k: usize| path.interior.get(k.wrapping_sub(1)).map(|v| v.point.ng);
     let edge = |k: usize| {
@@ -94,7 +94,8 @@ fn fast_weights_are_those_of_the_definition() {
     assert!(checked > 60_000, "{checked}");
 }
 
-/// Every registered method, with parameters that lead through all its weights; a new method takes part by being registered.
+/// Every registered method, with parameters that lead through all its weights; a new method takes part by being
+/// registered.
 #[test]
 fn weights_of_every_method_are_those_of_the_definition() {
     for spec in bidirectional_methods() {
@@ -125,8 +126,8 @@ fn weights_of_every_method_are_those_of_the_definition() {
     }
 }
 
-/// Densities of the first n vertices of one end of a path, as the walk from there keeps them when it has arrived at the last. Numbers that
-/// must not be read are poisoned.
+/// Densities of the first n vertices of one end of a path, as the walk from there keeps them when it has arrived at the
+/// last. Numbers that must not be read are poisoned.
 struct Subpath<'a> {
     n: usize,
     /// Density of vertex i by the walk from this end.
@@ -199,7 +200,8 @@ fn weights_of_all_techniques_sum_to_one() {
                 let mis = context(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], [5, 2][i / 2 % 2]);
                 let d = PathPdfs::new(&scene, &mis, &|_| 1.0, path);
                 let slow = d.weights(&mis);
-                // A subset need not have any technique that makes the path; single precision has no densities beyond its range.
+                // A subset need not have any technique that makes the path; single precision has no densities beyond
+                // its range.
                 let extreme = |p: &f64| *p > 0.0 && !(1e-15..1e15).contains(p);
                 if slow.iter().all(|w| w.is_nan() || *w == 0.0) || d.light.iter().chain(&d.eye).any(extreme) {
                     continue;

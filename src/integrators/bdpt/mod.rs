@@ -1,8 +1,8 @@
 //! `bdpt`: bidirectional path tracing (Lafortune & Willems 1993; Veach & Guibas 1994; Veach 1997, §10).
 //!
-//! Every pixel of every iteration traces one eye sub-path z_0 … and one light sub-path y_0 … and connects every prefix of one with every
-//! prefix of the other. By default pixels share light sub-paths, and only some connections are made, where more would not pay
-//! (`bidir::allocation`); weights count them.
+//! Every pixel of every iteration traces one eye sub-path z_0 … and one light sub-path y_0 … and connects every prefix
+//! of one with every prefix of the other. By default pixels share light sub-paths, and only some connections are made,
+//! where more would not pay (`bidir::allocation`); weights count them.
 
 mod own_subpath;
 mod params;

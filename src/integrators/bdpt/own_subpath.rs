@@ -1,4 +1,5 @@
-//! Every eye vertex is connected to the vertices of one light sub-path, which the pixel traces for itself or shares with a few others.
+//! Every eye vertex is connected to the vertices of one light sub-path, which the pixel traces for itself or shares
+//! with a few others.
 
 use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex};
 use crate::math::sampler::PathSampler;
@@ -10,7 +11,8 @@ use crate::path::StoredPlace;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct OwnSubpath;
 
-/// Light vertices whose connections are left out or made independently of each other; a vertex beyond has the choice of an earlier one.
+/// Light vertices whose connections are left out or made independently of each other; a vertex beyond has the choice of
+/// an earlier one.
 const INDEPENDENT: usize = 64;
 
 /// A mask in which each bit is set independently with the probability `fraction`, a power of two of at most one.

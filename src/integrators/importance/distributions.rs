@@ -6,13 +6,14 @@
 //! * *bounded*: in proportion to f_y/p alone, without a geometry term that may be huge (B; records on surfaces only);
 //! * *uniform* (C, eq. 8).
 //!
-//! *By the max heuristic*, as published, one of them is chosen with equal probability, and produces only the vertices to which it gives the
-//! largest probability. Since they share no vertex then, all of them together are one pmf: each vertex has the probability of its
-//! winner, normalised over the vertices that it wins, over the number of pmfs that win any (§4.3, premultiplied).
+//! *By the max heuristic*, as published, one of them is chosen with equal probability, and produces only the vertices
+//! to which it gives the largest probability. Since they share no vertex then, all of them together are one pmf: each
+//! vertex has the probability of its winner, normalised over the vertices that it wins, over the number of pmfs that
+//! win any (§4.3, premultiplied).
 //!
-//! DEVIATION: *as a mixture* they keep their vertices: P = ⅖ P_seen + ⅖ P_open + ⅕ P_uniform. A vertex that two of them produce is then drawn
-//! more often instead of being left to one, and most draws go where the light is. These shares were the best of six in three scenes; others
-//! near them cost up to a fifth more time for the same error.
+//! DEVIATION: *as a mixture* they keep their vertices: P = ⅖ P_seen + ⅖ P_open + ⅕ P_uniform. A vertex that two of them
+//! produce is then drawn more often instead of being left to one, and most draws go where the light is. These shares
+//! were the best of six in three scenes; others near them cost up to a fifth more time for the same error.
 //!
 //! All but the uniform one, which alone reaches everything, can be switched off.
 
@@ -75,8 +76,8 @@ pub(super) fn by_max(weights: [&[f32]; DISTRIBUTIONS - 1], rows: &mut CdfRows) -
     sums
 }
 
-/// Factors from the weights of seen and open to their parts of a mixture's probability. Where one of them has no weight, the other gets its
-/// share; where both have none, all of the mixture is uniform, and both factors are zero.
+/// Factors from the weights of seen and open to their parts of a mixture's probability. Where one of them has no
+/// weight, the other gets its share; where both have none, all of the mixture is uniform, and both factors are zero.
 pub(super) fn mixture([seen, open, _]: Sums) -> [f64; 2] {
     match [seen, open].map(scale) {
         [seen, 0.0] => [(SEEN + OPEN) * seen, 0.0],
@@ -116,7 +117,8 @@ mod tests {
 
     #[test]
     fn the_largest_probability_wins() {
-        // Seen: 0.8 0.2 0 0; open: 0.1 0.1 0.7 0.1; uniform: 0.25. The first two are won by seen and uniform, then open and uniform.
+        // Seen: 0.8 0.2 0 0; open: 0.1 0.1 0.7 0.1; uniform: 0.25. The first two are won by seen and uniform, then open
+        // and uniform.
         let p = probabilities(by_max, [&[8.0, 2.0, 0.0, 0.0], &[1.0, 1.0, 7.0, 1.0], &[0.0; 4]]);
         are(&p, &[1.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0, 1.0 / 6.0]);
     }

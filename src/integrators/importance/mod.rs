@@ -1,4 +1,5 @@
-//! Importance caching: pmfs of light vertices are kept at few places, as a combination of cautious and daring ones (`distributions`).
+//! Importance caching: pmfs of light vertices are kept at few places, as a combination of cautious and daring ones
+//! (`distributions`).
 //!
 //! * `skeleton` (SkelBPT, Noël and Biri 2015): at nodes in the middle of empty space. Every eye vertex belongs to a node, which is found in
 //!   constant time.
@@ -6,13 +7,13 @@
 //! * `importance-caching` (Georgiev et al. 2012): many-light rendering. Points that the camera sees are connected to virtual lights, the
 //!   vertices of all light sub-paths; there are no other techniques, so the 1/d² of near ones shows.
 //!
-//! As published, the first two connect an eye vertex to one light sub-path of each length, with the weights of bidirectional path tracing.
-//! Balance weights do not count how much likelier than others the sub-paths are drawn that matter, so that other techniques keep most of the
-//! light, and noise.
+//! As published, the first two connect an eye vertex to one light sub-path of each length, with the weights of
+//! bidirectional path tracing. Balance weights do not count how much likelier than others the sub-paths are drawn that
+//! matter, so that other techniques keep most of the light, and noise.
 //!
-//! DEVIATION: by default eye vertices draw from all lengths together, and weights count the density of drawing as those of `ris` do, from
-//! means of earlier iterations at the same records (`mis::factors::record_mixture`). They are wrong where an eye vertex sees light that its
-//! record does not, and cost no rays.
+//! DEVIATION: by default eye vertices draw from all lengths together, and weights count the density of drawing as those
+//! of `ris` do, from means of earlier iterations at the same records (`mis::factors::record_mixture`). They are wrong
+//! where an eye vertex sees light that its record does not, and cost no rays.
 
 mod distributions;
 mod ic_bdpt;

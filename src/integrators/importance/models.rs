@@ -1,4 +1,5 @@
-//! The knowledge of the weights of importance caching: the connection factors of `mis::factors`, with the look-ups at records that they need.
+//! The knowledge of the weights of importance caching: the connection factors of `mis::factors`, with the look-ups at
+//! records that they need.
 
 use super::distributions::UNIFORM;
 use super::strategy::{NearestRecords, RecordStructure};
@@ -34,7 +35,8 @@ pub(super) trait RecordFactor: ConnectionFactor {
     /// Completes a look-up by the visibility of a light vertex.
     fn see(_records: &RecordStructure, _lookup: &mut Self::Lookup, _y: &SegmentEnd, _tracer: &mut Tracer) {}
 
-    /// The argument of the factor of the edge from the light vertex at `y`, with the adjoint BSDF value `value`, to the eye vertex.
+    /// The argument of the factor of the edge from the light vertex at `y`, with the adjoint BSDF value `value`, to the
+    /// eye vertex.
     fn edge(
         records: &RecordStructure,
         lookup: &Self::Lookup,

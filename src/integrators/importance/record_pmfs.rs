@@ -1,10 +1,12 @@
 //! The pmfs of light vertices at importance records: several pmfs at each, combined into one (`distributions`).
 //!
-//! As published, light vertices are told apart by the length of their sub-paths, so that an eye vertex is connected to one of each length, and
-//! at nodes the weight of a vertex is L/d² (Noël and Biri 2015, eq. 5); many lights are one class.
+//! As published, light vertices are told apart by the length of their sub-paths, so that an eye vertex is connected to
+//! one of each length, and at nodes the weight of a vertex is L/d² (Noël and Biri 2015, eq. 5); many lights are one
+//! class.
 //!
-//! DEVIATION: with [`Selection::Mixture`] all lengths are one class: few draws go to sub-paths that are long and dim; and the weight of a
-//! vertex at a node is f_y ρ/d², the light that it sends there. At records on surfaces it always is f_y ρ G.
+//! DEVIATION: with [`Selection::Mixture`] all lengths are one class: few draws go to sub-paths that are long and dim;
+//! and the weight of a vertex at a node is f_y ρ/d², the light that it sends there. At records on surfaces it always is
+//! f_y ρ G.
 
 use super::distributions::{Distribution, Sums, by_max, by_mixture};
 use super::records::ImportanceRecords;
@@ -204,7 +206,8 @@ struct Source<'a> {
 }
 
 impl Weights {
-    /// Finds the weights of all vertices at all records of a group, by packets of shadow rays from all records to one vertex.
+    /// Finds the weights of all vertices at all records of a group, by packets of shadow rays from all records to one
+    /// vertex.
     fn find(&mut self, source: &Source, tracer: &mut Tracer) {
         let (records, vertices) = (source.group.len(), source.vertices.len());
         for list in [&mut self.seen, &mut self.open, &mut self.bounded] {

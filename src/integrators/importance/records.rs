@@ -1,8 +1,8 @@
 //! The places at which importance caching keeps pmfs: records on surfaces, or nodes in the middle of empty space.
 //!
-//! Records are the vertices of few eye sub-paths (Georgiev et al. 2012, "Importance caching for complex illumination"). Nodes are those of
-//! the scene's skeleton (Noël and Biri 2015, "Skeleton based vertex connection resampling"); those that hardly any eye vertex
-//! belongs to are left out, and eye vertices there draw uniformly (§4.4).
+//! Records are the vertices of few eye sub-paths (Georgiev et al. 2012, "Importance caching for complex illumination").
+//! Nodes are those of the scene's skeleton (Noël and Biri 2015, "Skeleton based vertex connection resampling"); those
+//! that hardly any eye vertex belongs to are left out, and eye vertices there draw uniformly (§4.4).
 
 use super::record_pmfs::Selection;
 use crate::bidir::WarmUp;
@@ -104,14 +104,15 @@ impl ImportanceRecords {
         }
     }
 
-    /// Mean factor between the light that a record counts and the irradiance of a surface there. A node counts light of all directions
-    /// without a cosine.
+    /// Mean factor between the light that a record counts and the irradiance of a surface there. A node counts light of
+    /// all directions without a cosine.
     pub fn mean_cosine(&self) -> f64 {
         if self.normals.is_some() { 1.0 } else { 0.5 }
     }
 
-    /// The light at a record over the throughput of a light vertex at `p` with the adjoint BSDF value `value`, visibility taken for granted:
-    /// ρ G at records on surfaces; at nodes ρ / d², or 1 / d² as published (Noël and Biri 2015, eq. 5).
+    /// The light at a record over the throughput of a light vertex at `p` with the adjoint BSDF value `value`,
+    /// visibility taken for granted: ρ G at records on surfaces; at nodes ρ / d², or 1 / d² as published (Noël and Biri
+    /// 2015, eq. 5).
     #[inline]
     pub fn unoccluded(&self, record: usize, selection: Selection, p: Vec3, value: impl Fn(Vec3) -> Rgb) -> Rgb {
         let at = self.ends[record].position();
@@ -122,7 +123,8 @@ impl ImportanceRecords {
             None => {
                 let to = at - p;
                 let inverse = 1.0 / to.length_squared();
-                // DEVIATION: the mixture counts ρ at nodes, too: light that the vertex does not send there need not be drawn.
+                // DEVIATION: the mixture counts ρ at nodes, too: light that the vertex does not send there need not be
+                // drawn.
                 if selection == Selection::Mixture { value(to * inverse.sqrt()) * inverse } else { Rgb::grey(inverse) }
             }
         }

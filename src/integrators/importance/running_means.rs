@@ -1,4 +1,5 @@
-//! Sums over iterations of the weights that pmfs at records are made of, by length of light sub-paths: the knowledge of weights.
+//! Sums over iterations of the weights that pmfs at records are made of, by length of light sub-paths: the knowledge of
+//! weights.
 
 use super::distributions::{UNIFORM, mixture};
 use super::record_pmfs::RecordPmfs;
@@ -44,8 +45,9 @@ impl RunningMeans {
         PerLengthMeans { means: means.collect(), numbers }
     }
 
-    /// Where all light vertices are drawn from together: the factor from the light of a vertex at the record to the probability with which the
-    /// record's mixture draws it over the uniform probability, without the uniform component and over its share; zero if no light is known of.
+    /// Where all light vertices are drawn from together: the factor from the light of a vertex at the record to the
+    /// probability with which the record's mixture draws it over the uniform probability, without the uniform component
+    /// and over its share; zero if no light is known of.
     #[inline]
     pub fn probability_per_light(&self, record: usize) -> f64 {
         // All lengths are one class, of length 0.

@@ -1,4 +1,5 @@
-//! Connections drawn by the pmfs at the importance records of an eye vertex: its skeleton node, or the nearest records on surfaces.
+//! Connections drawn by the pmfs at the importance records of an eye vertex: its skeleton node, or the nearest records
+//! on surfaces.
 
 use super::models::RecordFactor;
 use super::record_pmfs::{RecordPmfs, Selection, SelectionScheme};
@@ -156,8 +157,8 @@ impl<F: RecordFactor> RecordStrategy<F> {
         mut drawn: impl FnMut(Candidate<'a, F::Lookup>),
     ) {
         let (pmfs, samples) = (&self.structure.pmfs, self.settings.samples);
-        // Long sub-paths are rare and dim: no more of them are connected to than a pixel's own sub-path would have. A sub-path is then
-        // as likely to be met as by the pixel's own: in weights, such connections count as one.
+        // Long sub-paths are rare and dim: no more of them are connected to than a pixel's own sub-path would have. A
+        // sub-path is then as likely to be met as by the pixel's own: in weights, such connections count as one.
         let share = pmfs.length(class).map_or(1.0, |s| self.structure.share_of_length(s));
         let fraction = eye.fraction * share;
         // Next event leaves the last of its numbers. Classes have offsets of their own, or their draws would be alike.

@@ -1,5 +1,5 @@
-//! `light`: light tracing (Dutré, Lafortune & Willems 1993; Veach 1997, §8.3.4): every vertex of every light sub-path is connected to
-//! the lens. It is bidirectional path tracing with the techniques t = 1 alone.
+//! `light`: light tracing (Dutré, Lafortune & Willems 1993; Veach 1997, §8.3.4): every vertex of every light sub-path
+//! is connected to the lens. It is bidirectional path tracing with the techniques t = 1 alone.
 //!
 //! A pinhole or lens that looks at the world through a mirror or a pane is never reached: such paths are missing.
 

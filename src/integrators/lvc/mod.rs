@@ -1,9 +1,9 @@
-//! `lvc`: bidirectional path tracing with a light vertex cache (Davidovič, Křivánek, Hašan & Slusallek 2014, "Progressive light transport
-//! simulation on the GPU: survey and improvements", §5.2). All light sub-paths of an iteration are traced first; every eye vertex is then
-//! connected to C of their vertices, drawn uniformly.
+//! `lvc`: bidirectional path tracing with a light vertex cache (Davidovič, Křivánek, Hašan & Slusallek 2014,
+//! "Progressive light transport simulation on the GPU: survey and improvements", §5.2). All light sub-paths of an
+//! iteration are traced first; every eye vertex is then connected to C of their vertices, drawn uniformly.
 //!
-//! It is the baseline between `bdpt`, whose eye vertices are connected to all vertices of one light sub-path, and `pcbpt`, whose eye vertices
-//! draw by the light that arrives.
+//! It is the baseline between `bdpt`, whose eye vertices are connected to all vertices of one light sub-path, and
+//! `pcbpt`, whose eye vertices draw by the light that arrives.
 
 mod params;
 mod strategy;

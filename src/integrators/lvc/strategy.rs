@@ -1,7 +1,7 @@
 //! Connections to stored light vertices, drawn uniformly.
 //!
-//! Each of C draws takes one of V stored vertices of M light sub-paths with the probability 1/V. A connection to the prefix ȳ that ends there
-//! is estimated by f / (C M p(ȳ) p(z̄) / V).
+//! Each of C draws takes one of V stored vertices of M light sub-paths with the probability 1/V. A connection to the
+//! prefix ȳ that ends there is estimated by f / (C M p(ȳ) p(z̄) / V).
 
 use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexCount, VertexStore, WarmUp};
 use crate::math::sampler::{PathSampler, SampleSlot, systematic};
@@ -85,7 +85,8 @@ impl ConnectionStrategy for VertexCache {
         if eye.store.is_empty() {
             return;
         }
-        // Next event leaves the last of its numbers. Systematic draws: vertices that are neighbours in the store are neighbours in space.
+        // Next event leaves the last of its numbers. Systematic draws: vertices that are neighbours in the store are
+        // neighbours in space.
         let [.., offset] = sampler.vertex(eye.vertex.index, SampleSlot::Emitter);
         let scale = vertices / (connections as f32 * self.state.paths as f32 * eye.fraction);
         for number in 0..connections {

@@ -1,4 +1,5 @@
-//! Parameters of integrators: declared once with default and meaning, set by `-p key=value` or a scene's `<integrator>` block.
+//! Parameters of integrators: declared once with default and meaning, set by `-p key=value` or a scene's `<integrator>`
+//! block.
 
 pub(super) mod presampled;
 pub(super) mod shared;

@@ -29,8 +29,8 @@ const RR_DEPTH: ParamSpec = ParamSpec {
 /// For eye sub-paths that carry all of the light.
 pub const RR_DEPTH_UNIDIRECTIONAL: ParamSpec = RR_DEPTH;
 
-/// For sub-paths of both ends, one of each kind per sample. Long paths are joined from short sub-paths: early roulette saves far more
-/// connections than it costs in variance.
+/// For sub-paths of both ends, one of each kind per sample. Long paths are joined from short sub-paths: early roulette
+/// saves far more connections than it costs in variance.
 pub const RR_DEPTH_BIDIRECTIONAL: ParamSpec = ParamSpec {
     default: ParamDefault::Int { default: 2, min: 1, max: 1_000_000 },
     long: "From this vertex on, counted from its own end, a sub-path survives with a probability that depends on the \
@@ -59,7 +59,8 @@ pub const HIDE_EMITTERS: ParamSpec = ParamSpec {
 pub const TECHNIQUES: ParamSpec = ParamSpec {
     name: "techniques",
     aliases: &[],
-    // Lights that the lens sees are hit by eye sub-paths at every sample; splats of the lights themselves could only add noise.
+    // Lights that the lens sees are hit by eye sub-paths at every sample; splats of the lights themselves could only
+    // add noise.
     default: ParamDefault::Techniques("-1:1"),
     unit: "",
     short: "Techniques (s, t) in use, as s:t with s light and t eye vertices",

@@ -1,10 +1,11 @@
 //! `path`: unidirectional path tracing with next-event estimation (Kajiya 1986; Veach 1997, §9 and §10.2).
 //!
-//! Two techniques make every path of k edges that ends on a light with extent. Seen from its last vertex x before the light, *hit* draws
-//! the direction from the BSDF, with density p_bsdf · q (q: survival of Russian roulette at x) per steradian, and *next event* draws a light
-//! with probability P(l | x) and a direction to it with density p_l per steradian. Both weigh their paths by the heuristic
-//! over these two densities, so the weights of a path sum to one. Delta lights are reached by next event alone, and after a delta event or
-//! from the camera lights are hit alone, each with weight one.
+//! Two techniques make every path of k edges that ends on a light with extent. Seen from its last vertex x before the
+//! light, *hit* draws the direction from the BSDF, with density p_bsdf · q (q: survival of Russian roulette at x) per
+//! steradian, and *next event* draws a light with probability P(l | x) and a direction to it with density p_l per
+//! steradian. Both weigh their paths by the heuristic over these two densities, so the weights of a path sum to one.
+//! Delta lights are reached by next event alone, and after a delta event or from the camera lights are hit alone, each
+//! with weight one.
 
 use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_UNIDIRECTIONAL, heuristic};
 use super::{Integrator, IntegratorSpec, Iteration, Params};
@@ -112,7 +113,8 @@ impl Integrator for PathTracer {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
         let this = &*self;
         let mut phases = Phases::default();
-        // A tile is much more work than handing it over, and larger pieces leave threads idle at the end of an iteration.
+        // A tile is much more work than handing it over, and larger pieces leave threads idle at the end of an
+        // iteration.
         let tiles = film.tiles.par_iter_mut().with_max_len(1);
         let tiles = tiles.map_init(SampleBuffer::default, |samples, tile| this.render_tile(iteration, tile, samples));
         let sum = |mut a: RayStats, b: RayStats| {

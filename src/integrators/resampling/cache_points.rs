@@ -1,8 +1,9 @@
 //! Cache points: surface points at which the pmfs of light vertices are found for the eye vertices around.
 //!
-//! They are the vertices of a few eye sub-paths (a fixed fraction of the number of pixels), traced once. Those that are near each other
-//! and face the same way form groups of up to sixteen, which share packets of shadow rays and, where there are two stages, the
-//! candidates of the second. Each keeps running means of the light found at it: its normalisations Q.
+//! They are the vertices of a few eye sub-paths (a fixed fraction of the number of pixels), traced once. Those that are
+//! near each other and face the same way form groups of up to sixteen, which share packets of shadow rays and, where
+//! there are two stages, the candidates of the second. Each keeps running means of the light found at it: its
+//! normalisations Q.
 
 use super::settings::ResamplingSettings;
 use crate::bidir::WarmUp;
@@ -25,8 +26,8 @@ const TRUST_RADII: f32 = 3.0;
 /// Fraction of light that surfaces at right angles may miss of each other's.
 const TILT: f32 = 0.25;
 
-/// The light that a cache point found in an iteration: the two targets (the full one first), and the part of the full one that none of its
-/// neighbours found.
+/// The light that a cache point found in an iteration: the two targets (the full one first), and the part of the full
+/// one that none of its neighbours found.
 pub(super) type FoundLight = [f64; 3];
 
 /// The state of a cache point, in one cache line.
@@ -68,8 +69,8 @@ struct CacheBsdfs {
     pool: BsdfPool,
 }
 
-/// Cuts a range of points in two along the longest side of the box around them, at a multiple of the size of a packet, until it fits
-/// into one.
+/// Cuts a range of points in two along the longest side of the box around them, at a multiple of the size of a packet,
+/// until it fits into one.
 fn group(points: &mut [EyeSubpathVertex], first: usize, groups: &mut Vec<Range<usize>>) {
     if points.len() <= PACKET {
         groups.push(first..first + points.len());
@@ -121,7 +122,8 @@ fn states(points: &[EyeSubpathVertex], groups: &[Range<usize>]) -> Vec<CacheStat
 }
 
 impl CachePoints {
-    /// The vertices of eye sub-paths, as many as `settings` say. If there are two stages, all neighbours of a point are of one group.
+    /// The vertices of eye sub-paths, as many as `settings` say. If there are two stages, all neighbours of a point are
+    /// of one group.
     pub fn place(warm_up: &WarmUp, settings: &ResamplingSettings) -> (CachePoints, RayStats) {
         let (EyeSubpathVertices { vertices: mut all, bsdfs: pool }, stats) =
             warm_up.eye_vertices(settings.cache_fraction);
@@ -165,8 +167,8 @@ impl CachePoints {
         &self.ends[cache]
     }
 
-    /// The weight in a cache point's pmf of light from the point `y` whose irradiance there is `irradiance`: the irradiance, or the radiance
-    /// that the surface there scatters to the eye.
+    /// The weight in a cache point's pmf of light from the point `y` whose irradiance there is `irradiance`: the
+    /// irradiance, or the radiance that the surface there scatters to the eye.
     #[inline]
     pub fn pmf_weight(&self, cache: usize, y: Vec3, irradiance: f32) -> f32 {
         let Some(CacheBsdfs { each, pool }) = &self.bsdfs else { return irradiance };
@@ -191,7 +193,8 @@ impl CachePoints {
         ReceiverBounds { centre, radius, normal }
     }
 
-    /// Means over iterations so far of the light that the cache points around a place found, on the side of the direction `d`.
+    /// Means over iterations so far of the light that the cache points around a place found, on the side of the
+    /// direction `d`.
     #[inline]
     pub fn normalization_at(&self, place: &StoredPlace, d: Vec3) -> NormalizationEstimate {
         if self.iterations == 0 {

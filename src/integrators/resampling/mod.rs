@@ -1,6 +1,6 @@
-//! Resampled connections: many light sub-paths are traced once per iteration, and every eye vertex is connected to one that was resampled at
-//! the cache points around (probabilistic connections, Popov et al. 2015; resampling-aware weights, Nabata et al. 2020; two-stage
-//! resampling, Nabata et al. 2020).
+//! Resampled connections: many light sub-paths are traced once per iteration, and every eye vertex is connected to one
+//! that was resampled at the cache points around (probabilistic connections, Popov et al. 2015; resampling-aware
+//! weights, Nabata et al. 2020; two-stage resampling, Nabata et al. 2020).
 //!
 //! `strategy` draws, `pmfs` and `cache_points` hold the probabilities, `models` tells weights what they know.
 

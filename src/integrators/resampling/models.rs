@@ -1,8 +1,9 @@
-//! The knowledge of the weights of resampled connections: the connection factors of `mis::factors`, with the look-ups at cache points that they
-//! need.
+//! The knowledge of the weights of resampled connections: the connection factors of `mis::factors`, with the look-ups
+//! at cache points that they need.
 //!
-//! A weight is wanted before its path's own shadow ray is sent, so the rays between cache points and vertices are traced at once and not
-//! queued. Those to a vertex that was drawn are not traced at all: the pmfs at the cache points know their answers.
+//! A weight is wanted before its path's own shadow ray is sent, so the rays between cache points and vertices are
+//! traced at once and not queued. Those to a vertex that was drawn are not traced at all: the pmfs at the cache points
+//! know their answers.
 
 use super::settings::ResamplingSettings;
 use super::strategy::{CacheStructure, NearestCaches};
@@ -35,7 +36,8 @@ pub(super) trait CacheFactor: ConnectionFactor {
     /// Completes a look-up by the visibility of a light vertex.
     fn see(_caches: &CacheStructure, _lookup: &mut Self::Lookup, _y: &SegmentEnd, _tracer: &mut Tracer) {}
 
-    /// The argument of the factor of the edge from the light vertex at `y`, with the adjoint BSDF value `value`, to the eye vertex.
+    /// The argument of the factor of the edge from the light vertex at `y`, with the adjoint BSDF value `value`, to the
+    /// eye vertex.
     fn edge(caches: &CacheStructure, lookup: &Self::Lookup, y: &StoredPlace, value: impl Fn(Vec3) -> Rgb)
     -> Self::Edge;
 }

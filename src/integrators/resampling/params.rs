@@ -1,7 +1,8 @@
 //! Parameters of methods that draw connections from many light sub-paths.
 //!
-//! Cited as *weights*: Nabata et al. 2020, "Resampling-aware weighting functions for bidirectional path tracing using multiple light
-//! sub-paths"; as *two-stage*: Nabata et al. 2020, "Two-stage resampling for bidirectional path tracing with multiple light sub-paths".
+//! Cited as *weights*: Nabata et al. 2020, "Resampling-aware weighting functions for bidirectional path tracing using
+//! multiple light sub-paths"; as *two-stage*: Nabata et al. 2020, "Two-stage resampling for bidirectional path tracing
+//! with multiple light sub-paths".
 
 use crate::integrators::params::presampled::PRESAMPLED_PATHS;
 use crate::integrators::params::{AliasValues, Choice, ParamAlias, ParamDefault, ParamSpec};
@@ -54,8 +55,8 @@ pub(super) const CACHE_DENSITY: ParamSpec = ParamSpec {
         Published: 0.4% (Nabata et al. 2020, resampling-aware weights, section 6.1).",
 };
 
-/// Cache points of methods with two stages. Groups of cache points share the first stage and cast few shadow rays in the second, so that
-/// cache points may be denser.
+/// Cache points of methods with two stages. Groups of cache points share the first stage and cast few shadow rays in
+/// the second, so that cache points may be denser.
 pub(super) const GROUPED_CACHE_DENSITY: ParamSpec = ParamSpec {
     default: ParamDefault::Fraction { default: 0.02, min: 0.0, max: 1.0 },
     long: "All vertices of these eye sub-paths are cache points. Groups of neighbouring cache points share the first \

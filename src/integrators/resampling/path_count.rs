@@ -1,7 +1,7 @@
 //! The number of light sub-paths of an iteration that is worth its time beside the eye sub-paths.
 //!
-//! The variance of a picture falls with M as A + B/M while the cost of an iteration grows as P e + M l, where each of P eye sub-paths costs e
-//! and a light sub-path l. Their product is least at M = √(B/A · P e/l).
+//! The variance of a picture falls with M as A + B/M while the cost of an iteration grows as P e + M l, where each of P
+//! eye sub-paths costs e and a light sub-path l. Their product is least at M = √(B/A · P e/l).
 //!
 //! DEVIATION: Nabata et al. 2020, "Two-stage resampling", §6 takes M₁ = 10,000 for all scenes.
 

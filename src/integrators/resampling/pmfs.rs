@@ -1,14 +1,15 @@
 //! The pmfs of an iteration's light vertices at cache points.
 //!
-//! A group of cache points has *entries*: the light vertices that its points choose from. With one stage these are all vertices of the
-//! iteration. With two stages the vertices are cut into M₂ clusters that look like one point from the group, and one is drawn from each:
-//! Y_j of cluster C_j with P₁ = (f_y/p)(Y_j) / S_j, S_j = Σ over C_j of f_y/p (Nabata et al. 2020, "Two-stage resampling", §5.1).
+//! A group of cache points has *entries*: the light vertices that its points choose from. With one stage these are all
+//! vertices of the iteration. With two stages the vertices are cut into M₂ clusters that look like one point from the
+//! group, and one is drawn from each: Y_j of cluster C_j with P₁ = (f_y/p)(Y_j) / S_j, S_j = Σ over C_j of f_y/p
+//! (Nabata et al. 2020, "Two-stage resampling", §5.1).
 //!
-//! Every cache point then has a pmf P₂(j) of its entries, proportional to q̂₂/(p P₁): the light that the entry brings to the cache point,
-//! visibility included, times the number of vertices that the entry represents.
+//! Every cache point then has a pmf P₂(j) of its entries, proportional to q̂₂/(p P₁): the light that the entry brings
+//! to the cache point, visibility included, times the number of vertices that the entry represents.
 //!
-//! DEVIATION: eq. 15 there divides by M₂, which is right for M₂ independent draws from one P₁. One drawn per cluster, the entries sum up to
-//! the whole by themselves: there is no 1/M₂, and P₂ has the factor S_j, which eq. 16 leaves out.
+//! DEVIATION: eq. 15 there divides by M₂, which is right for M₂ independent draws from one P₁. One drawn per cluster,
+//! the entries sum up to the whole by themselves: there is no 1/M₂, and P₂ has the factor S_j, which eq. 16 leaves out.
 //!
 //! Shadow rays go out in packets, from all points of a group to one light vertex.
 
@@ -185,8 +186,8 @@ impl GroupPmf {
 }
 
 impl Pmfs {
-    /// Finds the pmfs of the vertices of `store`. `second_stage` is M₂, if there are two stages; the random numbers of the first stage are
-    /// those of the seed and of `set`.
+    /// Finds the pmfs of the vertices of `store`. `second_stage` is M₂, if there are two stages; the random numbers of
+    /// the first stage are those of the seed and of `set`.
     pub fn find(
         &mut self,
         iteration: &Iteration,
@@ -225,8 +226,8 @@ impl Pmfs {
         self.groups.iter().flat_map(|g| &g.found)
     }
 
-    /// Draws from the mixture of the probabilities at `n` cache points, all of one group if there are two stages, and an equal share of
-    /// all entries; `None` if there are no entries. There is at least one cache point.
+    /// Draws from the mixture of the probabilities at `n` cache points, all of one group if there are two stages, and
+    /// an equal share of all entries; `None` if there are no entries. There is at least one cache point.
     #[inline]
     pub fn draw(&self, caches: &[usize], u: [f32; 2]) -> Option<Selection> {
         let group = &self.groups[*self.group_of.get(*caches.first()?)? as usize];

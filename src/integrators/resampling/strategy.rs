@@ -1,20 +1,23 @@
 //! Connections drawn by the pmfs at the cache points near an eye vertex.
 //!
-//! All vertices of M light sub-paths are candidates. At cache points (`cache_points`) each has a probability proportional to
-//! the light that it brings there, visibility included (`pmfs`). An eye vertex z draws from the mixture
+//! All vertices of M light sub-paths are candidates. At cache points (`cache_points`) each has a probability
+//! proportional to the light that it brings there, visibility included (`pmfs`). An eye vertex z draws from the mixture
 //!
 //! P(y | z) = Σ_i P_i(y) / (n + 1) + 1 / ((n + 1) V)
 //!
-//! of the n nearest cache points and a uniform component over all V vertices, and estimates its connections (s ≥ 2, all s at once) by
+//! of the n nearest cache points and a uniform component over all V vertices, and estimates its connections (s ≥ 2, all
+//! s at once) by
 //!
-//! w f / (N M p(ȳ) p(z̄) P(y | z))   for each of N draws (Nabata et al. 2020, "Resampling-aware weighting functions", eq. 6).
+//! w f / (N M p(ȳ) p(z̄) P(y | z))   for each of N draws (Nabata et al. 2020, "Resampling-aware weighting functions",
+//! eq. 6).
 //!
-//! DEVIATION: eq. 6 there has the pmf of one of n + 1 techniques, each with a weight of its own (`proposal_model=per-cache`). The mixture is
-//! one technique with one pmf, which is positive wherever f is, so that any weights that sum to one per path make the estimate unbiased.
+//! DEVIATION: eq. 6 there has the pmf of one of n + 1 techniques, each with a weight of its own
+//! (`proposal_model=per-cache`). The mixture is one technique with one pmf, which is positive wherever f is, so that
+//! any weights that sum to one per path make the estimate unbiased.
 //!
-//! With two stages, pmfs are of M₂ representatives of all vertices, drawn before by the light they would bring if all were in sight. Groups of
-//! neighbouring cache points share their representatives, so that the mixture above is one over the same M₂ vertices; P is then P₁ P₂
-//! (Nabata et al. 2020, "Two-stage resampling").
+//! With two stages, pmfs are of M₂ representatives of all vertices, drawn before by the light they would bring if all
+//! were in sight. Groups of neighbouring cache points share their representatives, so that the mixture above is one
+//! over the same M₂ vertices; P is then P₁ P₂ (Nabata et al. 2020, "Two-stage resampling").
 
 use super::cache_points::{CachePoints, FoundLight};
 use super::models::CacheFactor;
@@ -130,8 +133,8 @@ impl<F: CacheFactor> CacheStrategy<F> {
         }
     }
 
-    /// Chooses one of the cache points `near` or the virtual one, and draws by its pmf alone: the number of the cache point, and the light
-    /// vertex with its probability, the choice of the cache point included.
+    /// Chooses one of the cache points `near` or the virtual one, and draws by its pmf alone: the number of the cache
+    /// point, and the light vertex with its probability, the choice of the cache point included.
     fn select_per_cache(&self, near: &NearestCaches, u: [f32; 2], store: &VertexStore) -> Option<(usize, Selection)> {
         let (n, pmfs) = (near.count, &self.caches.pmfs);
         let chosen = ((u[0] * (n + 1) as f32) as usize).min(n);

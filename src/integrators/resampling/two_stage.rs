@@ -1,4 +1,5 @@
-//! `two-stage`: resampled connections in two stages, from very many light sub-paths (Nabata et al. 2020, "Two-stage resampling").
+//! `two-stage`: resampled connections in two stages, from very many light sub-paths (Nabata et al. 2020, "Two-stage
+//! resampling").
 
 use super::params;
 use crate::integrators::params::presampled::{CONNECTIONS_PER_VERTEX, RR_SCALE};

@@ -1,7 +1,7 @@
 //! Refractive indices of metals, η + iκ in linear Rec. 709, by the names that Mitsuba uses.
 //!
-//! The numbers are what Mitsuba 3.9.1 (scalar_rgb) makes of the measured spectra it ships; three channels of a spectrum under D65,
-//! clamped at zero. `none` is the perfect mirror.
+//! The numbers are what Mitsuba 3.9.1 (scalar_rgb) makes of the measured spectra it ships; three channels of a spectrum
+//! under D65, clamped at zero. `none` is the perfect mirror.
 
 /// Name, η, κ.
 type Metal = (&'static str, [f32; 3], [f32; 3]);

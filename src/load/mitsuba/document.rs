@@ -394,7 +394,8 @@ fn offset(text: &str, row: u32, column: u32) -> usize {
     start + line.char_indices().nth(column.saturating_sub(1) as usize).map_or(line.len(), |(i, _)| i)
 }
 
-/// Where elements are nested too deep. Asked before parsing: the parser and all that follows call themselves for each level.
+/// Where elements are nested too deep. Asked before parsing: the parser and all that follows call themselves for each
+/// level.
 fn too_deep(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let (mut depth, mut i) = (0usize, 0usize);

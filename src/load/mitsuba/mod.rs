@@ -1,8 +1,8 @@
 //! Mitsuba's XML scene format in its 0.6, 2.x and 3.x spellings.
 //!
-//! Three steps: `document` reads the text (and included files) into a tree with source spans, parameters substituted and old
-//! spellings renamed; `props` looks at one element as a plugin with named properties, and knows which of them nobody asked
-//! for; the other files build what the plugins describe.
+//! Three steps: `document` reads the text (and included files) into a tree with source spans, parameters substituted
+//! and old spellings renamed; `props` looks at one element as a plugin with named properties, and knows which of them
+//! nobody asked for; the other files build what the plugins describe.
 
 mod bsdf;
 mod color;

@@ -77,7 +77,8 @@ impl<'t> Builder<'t> {
         found
     }
 
-    /// Runs `build` for an object unless it is being built already, i.e. contains itself. `from` is the element that led here.
+    /// Runs `build` for an object unless it is being built already, i.e. contains itself. `from` is the element that
+    /// led here.
     pub(super) fn guarded<T>(
         &mut self,
         object: usize,

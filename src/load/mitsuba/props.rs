@@ -1,5 +1,5 @@
-//! One element seen as a plugin with named properties. Every property that is asked for is remembered, so that in the end those
-//! nobody asked for can be reported, with the nearest name that would have been known.
+//! One element seen as a plugin with named properties. Every property that is asked for is remembered, so that in the
+//! end those nobody asked for can be reported, with the nearest name that would have been known.
 
 use super::document::{Node, OBJECT_TAGS, Tree};
 use super::transform;

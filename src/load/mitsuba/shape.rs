@@ -188,7 +188,8 @@ impl Builder<'_> {
     }
 }
 
-/// The unit cylinder (around z from 0 to 1) → `p0` … `p1` with `radius`. The tangents are Mitsuba's: texture coordinates start there.
+/// The unit cylinder (around z from 0 to 1) → `p0` … `p1` with `radius`. The tangents are Mitsuba's: texture
+/// coordinates start there.
 fn cylinder_to_object(p: &Props<'_>) -> Option<DMat4> {
     let (p0, p1) = (p.vector("p0").unwrap_or(DVec3::ZERO), p.vector("p1").unwrap_or(DVec3::Z));
     let radius = p.positive_or("radius", 1.0);

@@ -1,9 +1,10 @@
 //! Spectra to linear Rec. 709.
 //!
-//! The CIE 1931 colour matching functions are the multi-lobe fits of Wyman, Sloan & Shirley 2013, "Simple analytic approximations
-//! to the CIE XYZ color matching functions", JCGT 2(2), eq. 4. Reflectances are seen under CIE D65 and scaled so that a
-//! reflectance of 1 is exactly white; emissions are taken as they are, so that an emission of 1 at all wavelengths is the
-//! (reddish) equal-energy stimulus of luminance 1, as in Mitsuba 3's RGB mode. Colours outside the gamut are clamped to it.
+//! The CIE 1931 colour matching functions are the multi-lobe fits of Wyman, Sloan & Shirley 2013, "Simple analytic
+//! approximations to the CIE XYZ color matching functions", JCGT 2(2), eq. 4. Reflectances are seen under CIE D65 and
+//! scaled so that a reflectance of 1 is exactly white; emissions are taken as they are, so that an emission of 1 at all
+//! wavelengths is the (reddish) equal-energy stimulus of luminance 1, as in Mitsuba 3's RGB mode. Colours outside the
+//! gamut are clamped to it.
 
 use super::values::number;
 use crate::math::Rgb;
@@ -163,7 +164,8 @@ mod tests {
         near(white * (1.0 / white.g), [1.0, 1.0, 1.0], 0.08);
         let warm = blackbody(2700.0, 1.0);
         assert!(warm.r > 1.5 * warm.g && warm.g > 2.0 * warm.b);
-        // Luminance-weighted radiance of Planck's law at 2856 K (CIE illuminant A) is 185.1 W/(m² sr nm) at 555 nm / 1000.
+        // Luminance-weighted radiance of Planck's law at 2856 K (CIE illuminant A) is 185.1 W/(m² sr nm) at 555 nm /
+        // 1000.
         let peak = blackbody(2856.0, 1.0).luminance();
         assert!(peak > 100.0 && peak < 400.0, "{peak}");
     }

@@ -1,5 +1,5 @@
-//! Where the sun stands: the PSA algorithm (Blanco-Muriel et al. 2001, "Computing the solar vector", Solar Energy 70(5)), good to
-//! half a minute of arc in the years 1999 – 2015.
+//! Where the sun stands: the PSA algorithm (Blanco-Muriel et al. 2001, "Computing the solar vector", Solar Energy
+//! 70(5)), good to half a minute of arc in the years 1999 – 2015.
 
 use super::props::Props;
 use glam::{DMat4, DVec3};
@@ -59,8 +59,8 @@ pub(super) fn from_y_up(d: DVec3) -> DVec3 {
     DVec3::new(d.x, -d.z, d.y)
 }
 
-/// Unit vector to the sun in light space. Mitsuba 3 has x to the south and y to the west, 0.6 x to the east and z (in its y-up space)
-/// to the south.
+/// Unit vector to the sun in light space. Mitsuba 3 has x to the south and y to the west, 0.6 x to the east and z (in
+/// its y-up space) to the south.
 pub(super) fn direction(m: &Moment, legacy: bool) -> DVec3 {
     let (zenith, azimuth) = zenith_and_azimuth(m);
     let ((sin_z, cos_z), (sin_a, cos_a)) = (zenith.sin_cos(), azimuth.sin_cos());

@@ -8,7 +8,8 @@ use crate::scene::diag::Diagnostic;
 use crate::scene::{TextureDesc, TextureFilter, TextureId, WrapMode};
 
 impl Builder<'_> {
-    /// The texture `object`, reached from the element `from`; `data` reads eight-bit pictures as plain numbers, not as sRGB.
+    /// The texture `object`, reached from the element `from`; `data` reads eight-bit pictures as plain numbers, not as
+    /// sRGB.
     pub(super) fn texture(&mut self, from: usize, object: usize, data: bool) -> Option<TextureId> {
         if let Some(done) = self.textures.get(&(object, data)) {
             return *done;
@@ -93,7 +94,8 @@ impl Builder<'_> {
     }
 }
 
-/// `to_uv`, or 0.6's `uscale`, `vscale`, `uoffset`, `voffset` (the offset counts before the scale, as Mitsuba 3 upgrades it).
+/// `to_uv`, or 0.6's `uscale`, `vscale`, `uoffset`, `voffset` (the offset counts before the scale, as Mitsuba 3
+/// upgrades it).
 fn to_uv(p: &Props<'_>) -> [[f32; 3]; 2] {
     let m = p.transform("to_uv").unwrap_or(glam::DMat4::IDENTITY);
     let row = |r: usize| [m.x_axis[r], m.y_axis[r], m.w_axis[r]];

@@ -89,8 +89,8 @@ fn vector(step: &Node, default: f64) -> Result<DVec3, Fault> {
     Ok(DVec3::new(get("x")?, get("y")?, get("z")?))
 }
 
-/// Camera → world: +z towards `target`, +y as near to `up` as can be, +x = y × z (left of the picture). Without an `up` (zero) any
-/// will do; the choice is Mitsuba's, for the sake of equal pictures.
+/// Camera → world: +z towards `target`, +y as near to `up` as can be, +x = y × z (left of the picture). Without an `up`
+/// (zero) any will do; the choice is Mitsuba's, for the sake of equal pictures.
 pub(in crate::load) fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> Result<DMat4, String> {
     let forward = (target - origin).try_normalize().ok_or("`origin` and `target` are the same point")?;
     let up = if up == DVec3::ZERO { Frame::from_normal(forward.as_vec3()).s.as_dvec3() } else { up.normalize() };

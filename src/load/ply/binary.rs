@@ -1,7 +1,7 @@
 //! The body of a binary PLY file, chunk by chunk.
 //!
-//! Layouts that nearly all files have (float vertices, faces as one list of `uchar` length with 32-bit indices, little endian)
-//! run through loops without any decision per value; everything else through a table.
+//! Layouts that nearly all files have (float vertices, faces as one list of `uchar` length with 32-bit indices, little
+//! endian) run through loops without any decision per value; everything else through a table.
 
 use super::build::{Builder, VertexLayout, index_property};
 use super::header::{Element, Header, Kind, Scalar};
@@ -146,7 +146,8 @@ macro_rules! order {
 order!(Little, from_le_bytes);
 order!(Big, from_be_bytes);
 
-/// The `N` bytes at `offset`, which the caller has made sure are there. (One test and one load: this is the innermost loop.)
+/// The `N` bytes at `offset`, which the caller has made sure are there. (One test and one load: this is the innermost
+/// loop.)
 #[inline(always)]
 fn bytes<const N: usize>(row: &[u8], offset: usize) -> [u8; N] {
     row.get(offset..offset + N).and_then(|b| b.try_into().ok()).unwrap_or([0; N])

@@ -120,7 +120,8 @@ impl Builder {
         self.note_largest(corners.iter().copied().max().unwrap_or(0), face);
     }
 
-    /// Remembers the largest index; [`Builder::finish`] compares it with the number of vertices, which may come after the faces.
+    /// Remembers the largest index; [`Builder::finish`] compares it with the number of vertices, which may come after
+    /// the faces.
     pub(super) fn note_largest(&mut self, index: u32, face: u64) {
         if self.largest.is_none_or(|(largest, _)| index > largest) {
             self.largest = Some((index, face));

@@ -1,22 +1,23 @@
 //! c of a resampled connection where weights evaluate the targets at the cache points themselves, visibility included.
 //!
-//! *Per cache*, as published: an eye vertex chooses one of its n nearest cache points or a *virtual* one, each with probability 1/(n + 1),
-//! and draws a light sub-path by the pmf of that one alone; the virtual one draws uniformly (Nabata et al. 2020, "Resampling-aware weighting
-//! functions", §5.2). Cache point i aims at q̂_i, the light that the sub-path brings to cache point i, visibility included, and has the
-//! factor
+//! *Per cache*, as published: an eye vertex chooses one of its n nearest cache points or a *virtual* one, each with
+//! probability 1/(n + 1), and draws a light sub-path by the pmf of that one alone; the virtual one draws uniformly
+//! (Nabata et al. 2020, "Resampling-aware weighting functions", §5.2). Cache point i aims at q̂_i, the light that the
+//! sub-path brings to cache point i, visibility included, and has the factor
 //!
 //! c_i = [ 1/M + (1 − 1/M) · p/q_i ]⁻¹ with q_i = q̂_i/Q_i,   c_i = 0 where q̂_i = 0,   c = Σ_i c_i / (n + 1),
 //!
-//! and with two stages c_i = [ 1/M + (1 − 1/M) ( (1/M₂) p/q₁ + (1 − 1/M₂) p/q₂ ) ]⁻¹, q₁ being that of cache point i without visibility. The
-//! virtual one has q = p/L where L vertices per sub-path are drawn from alike; with two stages it draws from what the first left, whose
-//! density is the mean q₁ of the cache points.
+//! and with two stages c_i = [ 1/M + (1 − 1/M) ( (1/M₂) p/q₁ + (1 − 1/M₂) p/q₂ ) ]⁻¹, q₁ being that of cache point i
+//! without visibility. The virtual one has q = p/L where L vertices per sub-path are drawn from alike; with two stages
+//! it draws from what the first left, whose density is the mean q₁ of the cache points.
 //!
-//! *Mixture with visibility*: the pmfs are one mixture, Σ_i P_i/(n + 1), whose density is q = Σ_i q_i/(n + 1); c is the factor of one such
-//! draw. DEVIATION: one mixture instead of n + 1 techniques, because one pmf per technique needs one weight and no choice of a technique,
-//! and was the better one where cache points are dense.
+//! *Mixture with visibility*: the pmfs are one mixture, Σ_i P_i/(n + 1), whose density is q = Σ_i q_i/(n + 1); c is the
+//! factor of one such draw. DEVIATION: one mixture instead of n + 1 techniques, because one pmf per technique needs one
+//! weight and no choice of a technique, and was the better one where cache points are dense.
 //!
-//! Unlike [`RisFactor`](super::RisFactor), which assumes that cache points are where the eye vertex is, these factors need shadow rays from
-//! every cache point, for every technique of every path; in return they are exact about which sub-paths a cache point can draw.
+//! Unlike [`RisFactor`](super::RisFactor), which assumes that cache points are where the eye vertex is, these factors
+//! need shadow rays from every cache point, for every technique of every path; in return they are exact about which
+//! sub-paths a cache point can draw.
 
 use super::ris::Stages;
 use crate::math::Rgb;

@@ -1,14 +1,15 @@
 //! c of a connection that is drawn at an importance record or skeleton node from the light sub-paths of its own length.
 //!
-//! At a record, one of the N_s sub-paths of length s is drawn by the max combination of several pmfs (Noël and Biri 2015, §4.3): in
-//! proportion to the light that a sub-path brings there, with and without visibility, to its flux, and uniformly. The combined pmf is known
-//! only once the sub-paths are; the mean of the pmfs, which is at most as many times smaller as there are of them, stands for it:
+//! At a record, one of the N_s sub-paths of length s is drawn by the max combination of several pmfs (Noël and Biri
+//! 2015, §4.3): in proportion to the light that a sub-path brings there, with and without visibility, to its flux, and
+//! uniformly. The combined pmf is known only once the sub-paths are; the mean of the pmfs, which is at most as many
+//! times smaller as there are of them, stands for it:
 //!
 //! q/p = (1/k) ( 1 + Σ_d w_d / W_d ),   c = [ 1/N_s + (1 − 1/N_s) · p/q ]⁻¹,
 //!
-//! with w_d the weight of the sub-path in pmf d, W_d the mean of that weight over the sub-paths of this length in earlier iterations, and k the
-//! number of pmfs with W_d > 0, the uniform one included. Uniform drawing has c = 1, since as many sub-paths of each length are
-//! connected to as without resampling.
+//! with w_d the weight of the sub-path in pmf d, W_d the mean of that weight over the sub-paths of this length in
+//! earlier iterations, and k the number of pmfs with W_d > 0, the uniform one included. Uniform drawing has c = 1,
+//! since as many sub-paths of each length are connected to as without resampling.
 //!
 //! DEVIATION: Noël and Biri 2015 give balance weights; these are a named variant (`weights=aware`).
 

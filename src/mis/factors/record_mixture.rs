@@ -1,16 +1,16 @@
-//! c of a connection that is drawn at an importance record or skeleton node from all light vertices together, by the mixture
-//! P = ⅖ P_seen + ⅖ P_open + ⅕ P_uniform. `skeleton` and `ic-bdpt` use it by default; it costs no rays.
+//! c of a connection that is drawn at an importance record or skeleton node from all light vertices together, by the
+//! mixture P = ⅖ P_seen + ⅖ P_open + ⅕ P_uniform. `skeleton` and `ic-bdpt` use it by default; it costs no rays.
 //!
 //! The factor is that of resampling (Nabata et al. 2020, "Resampling-aware weighting functions", eq. 14) with
 //!
 //! q/p = (1 − u) a/Q + u/L,
 //!
-//! where a is the light that the sub-path brings to the eye vertex (visibility taken for granted), u the share of the uniform pmf, L the
-//! connectable vertices per light sub-path, and 1/Q the sum of ⅖/(1 − u) over the sums of the weights of each of the two other pmfs at the
-//! record, from earlier iterations.
+//! where a is the light that the sub-path brings to the eye vertex (visibility taken for granted), u the share of the
+//! uniform pmf, L the connectable vertices per light sub-path, and 1/Q the sum of ⅖/(1 − u) over the sums of the
+//! weights of each of the two other pmfs at the record, from earlier iterations.
 //!
-//! DEVIATION: Noël and Biri 2015 weigh by the balance heuristic, which does not know of the drawing. Balance weights leave most of the light
-//! to other techniques; they stay selectable (`weights=balance`).
+//! DEVIATION: Noël and Biri 2015 weigh by the balance heuristic, which does not know of the drawing. Balance weights
+//! leave most of the light to other techniques; they stay selectable (`weights=balance`).
 
 use super::ris::Stages;
 use crate::mis::factor::{ConnectionFactor, IncidentSubpath};

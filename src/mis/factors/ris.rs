@@ -1,20 +1,22 @@
-//! c of a connection that is resampled by one mixture of pmfs around the eye vertex z, where weights assume that the cache points of the
-//! mixture are at z itself. `ris` and `two-stage` use it with `proposal_model=mixture`; it costs no rays.
+//! c of a connection that is resampled by one mixture of pmfs around the eye vertex z, where weights assume that the
+//! cache points of the mixture are at z itself. `ris` and `two-stage` use it with `proposal_model=mixture`; it costs no
+//! rays.
 //!
-//! One stage (Nabata et al. 2020, "Resampling-aware weighting functions", eq. 14) aims at q̂ = f_y ρ G V, the light that the sub-path brings
-//! to z (per unit area, luminance, the BSDF at z left out), and Q is its integral over all sub-paths: the irradiance at z by light sub-paths
-//! of two and more vertices. With a = q̂/p, which one drawn sub-path estimates, q/p = a/Q. The pmf is a mixture with a uniform one, whose
-//! share is u; L vertices per sub-path then make q/p = (1 − u) a/Q + u/L.
+//! One stage (Nabata et al. 2020, "Resampling-aware weighting functions", eq. 14) aims at q̂ = f_y ρ G V, the light
+//! that the sub-path brings to z (per unit area, luminance, the BSDF at z left out), and Q is its integral over all
+//! sub-paths: the irradiance at z by light sub-paths of two and more vertices. With a = q̂/p, which one drawn sub-path
+//! estimates, q/p = a/Q. The pmf is a mixture with a uniform one, whose share is u; L vertices per sub-path then make
+//! q/p = (1 − u) a/Q + u/L.
 //!
-//! Two stages draw M₂ of the sub-paths by q̂₁ = f_y G first, and one of these by q̂₂ = q̂ (Nabata et al. 2020, "Two-stage
-//! resampling", eq. 17):
+//! Two stages draw M₂ of the sub-paths by q̂₁ = f_y G first, and one of these by q̂₂ = q̂ (Nabata et al. 2020,
+//! "Two-stage resampling", eq. 17):
 //!
 //! c = [ 1/M + (1 − 1/M) ( (1/M₂) p/q₁ + (1 − 1/M₂) p/q₂ ) ]⁻¹.
 //!
 //! The uniform share is one over the M₂, which are distributed as q₁: q₂/p = (1 − u) a₂/Q₂ + u a₁/Q₁.
 //!
-//! DEVIATION: both papers evaluate q̂ at the cache points, visibility included. Here it is evaluated at z and taken to be visible, with two
-//! corrections that cost no rays:
+//! DEVIATION: both papers evaluate q̂ at the cache points, visibility included. Here it is evaluated at z and taken to
+//! be visible, with two corrections that cost no rays:
 //!
 //! * Where the cache points do not see a sub-path that z sees, only the uniform share draws it, and the factor is c₀, of the uniform share
 //!   alone. How often that happens is estimated: it is the fraction π of their light that cache points would have missed by asking

@@ -1,12 +1,13 @@
-//! c of a connection to a light vertex that is drawn uniformly from all connectable vertices of the M light sub-paths of an iteration.
+//! c of a connection to a light vertex that is drawn uniformly from all connectable vertices of the M light sub-paths
+//! of an iteration.
 //!
-//! The M sub-paths have M p(ȳ) of a prefix ȳ, per unit measure, among V = L M vertices. Each draw has a given vertex with the probability
-//! 1/V, so that its density is M p(ȳ)/V = p(ȳ)/L, and
+//! The M sub-paths have M p(ȳ) of a prefix ȳ, per unit measure, among V = L M vertices. Each draw has a given vertex
+//! with the probability 1/V, so that its density is M p(ȳ)/V = p(ȳ)/L, and
 //!
 //! c = 1/L.
 //!
-//! L is the mean number of connectable vertices of a light sub-path in earlier iterations: the V of the iteration itself would make weights
-//! depend on the sub-paths that they weigh.
+//! L is the mean number of connectable vertices of a light sub-path in earlier iterations: the V of the iteration
+//! itself would make weights depend on the sub-paths that they weigh.
 
 use crate::mis::factor::{ConnectionFactor, IncidentSubpath};
 

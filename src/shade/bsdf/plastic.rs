@@ -1,5 +1,5 @@
-//! A smooth coat over a diffuse base (the `plastic` of Mitsuba): a discrete reflection by the coat, and light that enters
-//! the coat, scatters inside any number of times and leaves it.
+//! A smooth coat over a diffuse base (the `plastic` of Mitsuba): a discrete reflection by the coat, and light that
+//! enters the coat, scatters inside any number of times and leaves it.
 
 use super::dielectric::mirror;
 use super::diffuse::{cosine_above, cosine_pdf};

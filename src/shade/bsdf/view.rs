@@ -12,8 +12,8 @@ use std::f32::consts::FRAC_1_PI;
 
 /// A BSDF whose lobes and frames are borrowed, from a [`Bsdf`](super::Bsdf) or a [`BsdfPool`](super::BsdfPool).
 ///
-/// Functions that treat Lambertian BSDFs separately are always inlined, and those for lobes take the view by value: then
-/// the view never has to be put together in memory where the BSDF is Lambertian.
+/// Functions that treat Lambertian BSDFs separately are always inlined, and those for lobes take the view by value:
+/// then the view never has to be put together in memory where the BSDF is Lambertian.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfView<'a> {
     pub(super) ng: Vec3,

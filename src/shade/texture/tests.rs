@@ -68,8 +68,8 @@ fn bitmaps_agree_with_mitsuba() {
     }
 }
 
-/// Mitsuba multiplies by the resolution after undoing `to_uv`, which is wrong for rotated maps of pictures that are not square;
-/// here the gradient is that of the value.
+/// Mitsuba multiplies by the resolution after undoing `to_uv`, which is wrong for rotated maps of pictures that are not
+/// square; here the gradient is that of the value.
 #[test]
 fn gradients_are_differences_of_values() {
     let values = [3.0, 9.0, 1.0, 4.0, 7.0, 2.0, 8.0, 5.0, 6.0, 12.0, 10.0, 11.0].map(|v: f32| v / 16.0);

@@ -1,4 +1,5 @@
-//! The registered bidirectional methods, and parameters that make them do on small scenes all that they do on large ones.
+//! The registered bidirectional methods, and parameters that make them do on small scenes all that they do on large
+//! ones.
 
 use lightsieve::film::Pyramid;
 use lightsieve::integrators::{IntegratorSpec, Params, REGISTRY};
@@ -11,7 +12,8 @@ pub fn bidirectional_methods() -> impl Iterator<Item = &'static IntegratorSpec> 
     REGISTRY.iter().copied().filter(has_techniques)
 }
 
-/// Values of parameters by name: those that a method has suit small scenes, and lead through its choices as `variant` counts up.
+/// Values of parameters by name: those that a method has suit small scenes, and lead through its choices as `variant`
+/// counts up.
 pub fn for_small_scenes(spec: &IntegratorSpec, variant: usize) -> Vec<(&'static str, &'static str)> {
     let i = variant;
     let all = [

@@ -1,9 +1,10 @@
 //! Support for statistical tests: scenes, renders with an honest error, and the tests that compare them.
 //!
-//! One pixel's samples are stratified over iterations, so their sample variance says too much. A picture is therefore the
-//! mean of [`RENDERS`] short renders with different seeds, and its error comes from the spread of these. Two pictures are
-//! compared by Welch's t-test, in every pixel and channel with Šidák's correction for their number, and in the mean of the
-//! whole picture, which is far more sensitive to a bias that is everywhere. Seeds are fixed: a test that passes passes always.
+//! One pixel's samples are stratified over iterations, so their sample variance says too much. A picture is therefore
+//! the mean of [`RENDERS`] short renders with different seeds, and its error comes from the spread of these. Two
+//! pictures are compared by Welch's t-test, in every pixel and channel with Šidák's correction for their number, and in
+//! the mean of the whole picture, which is far more sensitive to a bias that is everywhere. Seeds are fixed: a test
+//! that passes passes always.
 
 use lightsieve::integrators::{IntegratorSpec, Params};
 use lightsieve::load::{LoadOptions, load_scene};
@@ -60,8 +61,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// [`RENDERS`] renders of `spp` samples per pixel each, with seeds from `seed` on. Parameters that the integrator does not
-    /// have are left out. Every sample must be finite and every ray valid.
+    /// [`RENDERS`] renders of `spp` samples per pixel each, with seeds from `seed` on. Parameters that the integrator
+    /// does not have are left out. Every sample must be finite and every ray valid.
     pub fn render(
         spec: &'static IntegratorSpec,
         scene: &PreparedScene,
@@ -70,8 +71,9 @@ impl Picture {
         seed: u64,
     ) -> Picture {
         let mut values = Params::defaults(spec);
-        // Few samples of few pixels show no variance of what is rare: splats of a small share of the light image, and long eye sub-paths
-        // that end early. Tests that want these ask for them. And few pixels need few light sub-paths, a small scene no fine voxels.
+        // Few samples of few pixels show no variance of what is rare: splats of a small share of the light image, and
+        // long eye sub-paths that end early. Tests that want these ask for them. And few pixels need few light
+        // sub-paths, a small scene no fine voxels.
         for (name, value) in
             [("allocation", "full"), ("rr_scale", "1"), ("voxel_resolution", "24"), ("presampled_paths", "100")]
                 .iter()
@@ -116,8 +118,8 @@ impl Picture {
         Picture::exact(vec![[value; 3]; pixels])
     }
 
-    /// The window `[x, y, width, height]` of a picture that has rows of `row` pixels. Its mean gets an upper bound of the variance, as
-    /// if the errors of all pixels were the same.
+    /// The window `[x, y, width, height]` of a picture that has rows of `row` pixels. Its mean gets an upper bound of
+    /// the variance, as if the errors of all pixels were the same.
     pub fn window(&self, row: u32, [x, y, width, height]: [u32; 4]) -> Picture {
         let inside: Vec<usize> =
             (0..height).flat_map(|j| (0..width).map(move |i| ((y + j) * row + x + i) as usize)).collect();
@@ -136,7 +138,8 @@ impl Picture {
         }
     }
 
-    /// Evidence against the expectations of both pictures being the same up to `tolerance` (relative), at [`SIGNIFICANCE`].
+    /// Evidence against the expectations of both pictures being the same up to `tolerance` (relative), at
+    /// [`SIGNIFICANCE`].
     pub fn difference(&self, other: &Picture, tolerance: f64) -> Option<String> {
         assert_eq!(self.mean.len(), other.mean.len());
         let tests = 3 * self.mean.len();
@@ -173,8 +176,8 @@ fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     (mean, values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n * (n - 1.0)))
 }
 
-/// Chance of a difference like this or larger between two means of equal expectation (Welch 1947); each mean comes with its
-/// variance. What is within the tolerance counts as no difference.
+/// Chance of a difference like this or larger between two means of equal expectation (Welch 1947); each mean comes with
+/// its variance. What is within the tolerance counts as no difference.
 pub fn chance(a: (f64, f64), b: (f64, f64), freedom: (f64, f64), tolerance: f64) -> f64 {
     let difference = (a.0 - b.0).abs() - (tolerance + ROUNDING) * a.0.abs().max(b.0.abs());
     if difference <= 0.0 {
@@ -195,8 +198,8 @@ pub fn unbiased() -> impl Iterator<Item = &'static IntegratorSpec> {
     lightsieve::integrators::REGISTRY.iter().copied().filter(|s| s.unbiased && s.name != "importance-caching")
 }
 
-/// The integrators of [`unbiased`] that sample every pixel by itself. Light tracing alone leaves the pixels of a small or narrow picture to chance, too
-/// noisy for tests that look at a pixel after few samples.
+/// The integrators of [`unbiased`] that sample every pixel by itself. Light tracing alone leaves the pixels of a small
+/// or narrow picture to chance, too noisy for tests that look at a pixel after few samples.
 pub fn sampled_by_pixel() -> impl Iterator<Item = &'static IntegratorSpec> {
     unbiased().filter(|s| s.name != "light")
 }

@@ -1,4 +1,5 @@
-//! A folder of its own for every test, a scene small enough to render in milliseconds, and the program run in that folder.
+//! A folder of its own for every test, a scene small enough to render in milliseconds, and the program run in that
+//! folder.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -9,7 +9,8 @@ fn pdf_tolerance(name: &str) -> Option<f32> {
     match name {
         // The exact shadowing function instead of its fit, so that densities integrate to one.
         n if n.contains("beckmann") => Some(4e-3),
-        // The choice of a lobe hangs on 1 − T of the coat's table, whose quadrature uses another map of the square: T itself agrees to 1e-4.
+        // The choice of a lobe hangs on 1 − T of the coat's table, whose quadrature uses another map of the square: T
+        // itself agrees to 1e-4.
         "rough_plastic_ggx" => Some(4e-3),
         // Lobes of a mixture are chosen by their albedo here, by their weight alone in Mitsuba.
         "blend" | "mask" => None,

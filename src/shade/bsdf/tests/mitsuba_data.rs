@@ -1,5 +1,5 @@
-//! Values of Mitsuba 3.9.1 (variant scalar_rgb): `bsdf.eval(ctx, si, wi)` and `bsdf.pdf(ctx, si, wi)` with `si.wi` = our `wo`, at a
-//! point with uv = (0.3, 0.6), dp_du = (1, 0, 0), dp_dv = (−0.1, 0.9, 0) and both normals +z.
+//! Values of Mitsuba 3.9.1 (variant scalar_rgb): `bsdf.eval(ctx, si, wi)` and `bsdf.pdf(ctx, si, wi)` with `si.wi` =
+//! our `wo`, at a point with uv = (0.3, 0.6), dp_du = (1, 0, 0), dp_dv = (−0.1, 0.9, 0) and both normals +z.
 
 /// Value (cosine weighted) and density.
 pub type Row = ([f32; 3], f32);
