@@ -175,7 +175,7 @@ pub(crate) struct InfoArgs {
     /// Cubes along the longest side of the scene from which the skeleton is made [default: 120, and up to 240 for
     /// flat scenes]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=512))]
-    pub skeleton_cells: Option<u32>,
+    pub voxel_resolution: Option<u32>,
 }
 
 #[derive(Debug, Args)]

@@ -80,7 +80,7 @@ fn describe_prepared(scene: &PreparedScene) {
 
 fn write_skeleton(args: &InfoArgs, scene: &PreparedScene) -> Result<(), Failure> {
     let start = Instant::now();
-    let made = Skeleton::of_scene(scene, args.skeleton_cells.map(|c| c as usize));
+    let made = Skeleton::of_scene(scene, args.voxel_resolution.map(|c| c as usize));
     let seconds = start.elapsed().as_secs_f64();
     let ([w, h, d], _) = made.resolution();
     out!(
