@@ -4,7 +4,7 @@ use super::Failure;
 use super::measure_args::BenchArgs;
 use super::session::{SceneMethods, Session, to_json};
 use crate::image::atomic_write;
-use crate::measure::bench::{Baseline, Row, Table as Measured, Verdict, against, calibrate};
+use crate::measure::bench::{Baseline, Change, Row, Table as Measured, Verdict, against, calibrate};
 use crate::measure::converge::{EqualTimeTask, converge};
 use crate::measure::curve::runs_of;
 use crate::measure::report::Table;
@@ -49,8 +49,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         let text = to_json(&measured)?;
         atomic_write(path, |w| writeln!(w, "{text}")).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
     }
-    let worse =
-        verdicts.iter().flatten().filter(|v| v.time.regression || v.error.is_some_and(|e| e.regression)).count();
+    let worse = verdicts.iter().flatten().filter(|v| v.is_worse()).count();
     match (verdicts, worse) {
         (Some(v), _) if v.is_empty() => {
             Err(Failure::Input("the baseline has none of these scenes and methods: nothing was compared".into()))
@@ -113,7 +112,7 @@ fn one_scene(args: &BenchArgs, session: &Session, scene: &SceneMethods) -> Resul
 fn print(rows: &[Row], verdicts: Option<&[Verdict]>) {
     let mut head = vec!["scene", "method", "ms per sample", "samples", "relMSE", "relMSE x seconds"];
     if verdicts.is_some() {
-        head.extend(["time", "error", ""]);
+        head.extend(["time", "error", "error of 16x16 blocks", ""]);
     }
     let mut table = Table::new(head);
     for row in rows {
@@ -129,9 +128,13 @@ fn print(rows: &[Row], verdicts: Option<&[Verdict]>) {
         let verdict = verdicts.into_iter().flatten().find(|v| v.scene == row.scene && v.method == row.method);
         if let Some(v) = verdict {
             cells.push(format!("x {:.3}", v.time.ratio));
-            cells.push(v.error.map_or("–".into(), |e| format!("x {:.3}", e.ratio)));
+            let ratio = |change: Option<Change>| change.map_or("–".into(), |e| format!("x {:.3}", e.ratio));
+            cells.extend([ratio(v.error), ratio(v.block_error)]);
             let slower = v.time.regression.then(|| format!("slower (bound {:.3})", v.time.bound));
-            let worse = v.error.filter(|e| e.regression).map(|e| format!("worse (bound {:.3})", e.bound));
+            let worse = |change: Option<Change>, what: &str| {
+                change.filter(|e| e.regression).map(|e| format!("{what} (bound {:.3})", e.bound))
+            };
+            let worse = worse(v.error, "worse").into_iter().chain(worse(v.block_error, "blocks worse"));
             cells.push(slower.into_iter().chain(worse).collect::<Vec<_>>().join(", "));
         }
         table.row(cells);

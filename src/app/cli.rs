@@ -112,7 +112,8 @@ pub(crate) struct RenderArgs {
     /// Time budget of the iterations, e.g. 30s, 5m, 1.5h
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub time: Option<Duration>,
-    /// Stop when the estimated error is below, e.g. relmse=0.01 (also mape, mae, mse, rmse, relmse_trimmed); renders
+    /// Stop when the estimated error is below, e.g. relmse=0.01 (also relmse_trimmed, mape, mae, mse, rmse; for means
+    /// of blocks of pixels relmse_8x8, relmse_16x16, relmse_32x32, for the mean of the picture relmse_whole); renders
     /// two halves with seeds of their own, whose difference tells
     #[arg(long, value_name = "MEASURE=VALUE", value_parser = ErrorTarget::parse)]
     pub error_target: Option<ErrorTarget>,

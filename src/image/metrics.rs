@@ -2,6 +2,7 @@
 
 use super::buffer::Image;
 use super::flip;
+use super::regions::{RegionErrors, region_errors};
 
 /// The measures that [`compare`] takes. d is the difference of a channel, r its reference; means go over channels and
 /// pixels. A measure without a value (no finite pixel, or a black reference for the ratio) is NaN.
@@ -19,6 +20,9 @@ pub struct Report {
     pub relmse: f64,
     /// relMSE without the worst 0.1 % of the pixels (rounded down), so that a few fireflies do not decide.
     pub relmse_trimmed: f64,
+    /// relMSE of means of regions.
+    #[serde(flatten)]
+    pub regions: RegionErrors,
     /// Mean LDR-ꟻLIP of the pictures clipped to [0, 1]; see [`flip::ldr_flip`].
     pub flip: f64,
     /// Mean HDR-ꟻLIP; see [`flip::hdr_flip`].
@@ -39,9 +43,9 @@ pub struct SizeMismatch {
     pub reference: (u32, u32),
 }
 
-/// The part of a [`Report`] that looks at each pixel alone; cheap enough for every iteration of a render.
+/// The part of a [`Report`] that needs no filters; cheap enough for every iteration of a render.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct PixelErrors {
+pub struct PictureErrors {
     /// See [`Report::mse`].
     pub mse: f64,
     /// See [`Report::mae`].
@@ -52,6 +56,9 @@ pub struct PixelErrors {
     pub relmse: f64,
     /// See [`Report::relmse_trimmed`].
     pub relmse_trimmed: f64,
+    /// See [`Report::regions`].
+    #[serde(flatten)]
+    pub regions: RegionErrors,
     /// See [`Report::mean_ratio`].
     pub mean_ratio: f64,
     /// See [`Report::non_finite`].
@@ -70,7 +77,7 @@ const TRIM: usize = 1000;
 /// [`SizeMismatch`].
 pub fn compare(image: &Image, reference: &Image) -> Result<Report, SizeMismatch> {
     let (image, reference, width) = colours(image, reference)?;
-    let e = pixel_errors(&image, &reference);
+    let e = picture_errors(&image, &reference, width);
 
     // Equal black in both pictures keeps a non-finite pixel from spreading through ꟻLIP's filters.
     let sound: Vec<bool> = image.iter().zip(&reference).map(|(a, b)| is_finite(a) && is_finite(b)).collect();
@@ -89,6 +96,7 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Report, SizeMismatch>
         mape: e.mape,
         relmse: e.relmse,
         relmse_trimmed: e.relmse_trimmed,
+        regions: e.regions,
         flip: mean(flip::ldr_flip(&image, &reference, width)),
         hdr_flip: mean(flip::hdr_flip(&image, &reference, width)),
         mean_ratio: e.mean_ratio,
@@ -119,11 +127,11 @@ fn is_finite(pixel: &[f64; 3]) -> bool {
     pixel.iter().all(|v| v.is_finite())
 }
 
-/// The measures that need no neighbours, of pixels in linear colour.
+/// The measures that need no filters, of pictures in linear colour whose rows have `width` pixels.
 ///
 /// # Panics
 /// If the pictures do not have equally many pixels.
-pub fn pixel_errors(image: &[[f64; 3]], reference: &[[f64; 3]]) -> PixelErrors {
+pub fn picture_errors(image: &[[f64; 3]], reference: &[[f64; 3]], width: usize) -> PictureErrors {
     assert_eq!(image.len(), reference.len());
     let (mut squares, mut absolutes, mut percentages) = (0.0, 0.0, 0.0);
     let (mut image_sum, mut reference_sum) = (0.0, 0.0);
@@ -145,12 +153,13 @@ pub fn pixel_errors(image: &[[f64; 3]], reference: &[[f64; 3]]) -> PixelErrors {
     let samples = 3.0 * pixels as f64;
     relative.sort_by(f64::total_cmp);
     let kept = &relative[..pixels - pixels / TRIM];
-    PixelErrors {
+    PictureErrors {
         mse: squares / samples,
         mae: absolutes / samples,
         mape: percentages / samples,
         relmse: relative.iter().sum::<f64>() / samples,
         relmse_trimmed: kept.iter().sum::<f64>() / (3.0 * kept.len() as f64),
+        regions: region_errors(image, reference, width),
         mean_ratio: image_sum / reference_sum,
         non_finite: (image.len() - pixels) as u64,
     }

@@ -10,6 +10,7 @@ pub mod flip;
 pub mod metrics;
 mod netpbm;
 pub mod read;
+pub mod regions;
 pub mod write;
 pub mod z_test;
 
@@ -18,4 +19,5 @@ pub use buffer::{Image, Pixels};
 pub use exr_layers::ExrFile;
 pub use metrics::{Report, SizeMismatch, compare};
 pub use read::{Encoding, ImageError, ImageFault, read_image};
+pub use regions::RegionErrors;
 pub use write::{Layer, OutputFormat, Picture, WriteError, write_picture};

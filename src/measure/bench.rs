@@ -1,11 +1,12 @@
 //! Scenes × integrators against earlier measurements: is anything slower, or noisier, than it was?
 //!
 //! Time is seconds per iteration over the time of a piece of plain arithmetic, measured around each scene, which
-//! takes out how fast the machine was at the time; error is the relMSE without the worst 0.1 % at the largest number
-//! of samples that both measurements have. Equal seeds make equal pictures, so an error that moves means an algorithm
-//! that has changed, and how much it may move by chance is known from the spread over seeds.
+//! takes out how fast the machine was at the time; error is the relMSE without the worst 0.1 %, and that of the means
+//! of 16 × 16 blocks, at the largest number of samples that both measurements have. Equal seeds make equal pictures, so
+//! an error that moves means an algorithm that has changed, and how much it may move by chance is known from the spread
+//! over seeds.
 
-use super::converge::Run;
+use super::converge::{Point, Run};
 use super::machine::{Load, Machine};
 use crate::math::hash::mix64;
 use rayon::prelude::*;
@@ -32,6 +33,9 @@ pub struct Row {
     pub calibration: f64,
     /// Samples per pixel, and the error of each seed there.
     pub errors: Vec<(u64, Vec<f64>)>,
+    /// The same of 16 × 16 blocks; earlier measurements have none.
+    #[serde(default)]
+    pub block_errors: Vec<(u64, Vec<f64>)>,
     /// Samples that were not finite.
     pub non_finite: u64,
 }
@@ -76,6 +80,8 @@ pub struct Verdict {
     pub time: Change,
     /// Error at equal samples; none if there are no equal numbers of samples.
     pub error: Option<Change>,
+    /// Error of 16 × 16 blocks at equal samples; none if one of the measurements has none.
+    pub block_error: Option<Change>,
 }
 
 impl Row {
@@ -83,16 +89,20 @@ impl Row {
     pub fn new(scene: &str, method: &str, runs: &[&Run], calibration: f64) -> Row {
         let ends = runs.iter().filter_map(|r| r.points.last());
         let first = runs.first().map(|r| r.points.as_slice()).unwrap_or_default();
-        let errors = first.iter().filter(|p| p.iterations.is_power_of_two()).filter_map(|p| {
-            let same = |r: &&Run| r.points.iter().find(|q| q.iterations == p.iterations).map(|q| q.relmse_trimmed);
-            runs.iter().map(same).collect::<Option<Vec<f64>>>().map(|e| (p.iterations, e))
-        });
+        let errors = |of: fn(&Point) -> f64| {
+            let at = |p: &Point| {
+                let same = |r: &&Run| r.points.iter().find(|q| q.iterations == p.iterations).map(of);
+                runs.iter().map(same).collect::<Option<Vec<f64>>>().map(|e| (p.iterations, e))
+            };
+            first.iter().filter(|p| p.iterations.is_power_of_two()).filter_map(at).collect()
+        };
         Row {
             scene: scene.into(),
             method: method.into(),
             seconds_per_iteration: ends.map(|p| p.seconds / p.iterations as f64).collect(),
             calibration,
-            errors: errors.collect(),
+            errors: errors(|p| p.relmse_trimmed),
+            block_errors: errors(|p| p.regions.relmse_16x16),
             non_finite: runs.iter().map(|r| r.non_finite).sum(),
         }
     }
@@ -123,6 +133,20 @@ fn change(old: (f64, f64), new: (f64, f64), tolerance: f64) -> Change {
     Change { ratio, bound, regression: ratio > bound }
 }
 
+/// The change of the errors at the largest number of samples that both have.
+fn error_change(old: &[(u64, Vec<f64>)], new: &[(u64, Vec<f64>)]) -> Option<Change> {
+    let before = |n: u64| old.iter().find(|e| e.0 == n).map(|e| moments(&e.1));
+    let (old, new) = new.iter().rev().find_map(|(n, errors)| Some((before(*n)?, moments(errors))))?;
+    Some(change(old, new, ERROR_TOLERANCE))
+}
+
+impl Verdict {
+    /// Something became worse.
+    pub fn is_worse(&self) -> bool {
+        self.time.regression || [self.error, self.block_error].into_iter().flatten().any(|e| e.regression)
+    }
+}
+
 /// Compares every row that both measurements have.
 pub fn against(old: &[Row], new: &[Row]) -> Vec<Verdict> {
     let pair = |row: &Row| {
@@ -131,13 +155,12 @@ pub fn against(old: &[Row], new: &[Row]) -> Vec<Verdict> {
             let (mean, error) = moments(&r.seconds_per_iteration);
             (mean / r.calibration, error / r.calibration)
         };
-        let at = |r: &Row, n: u64| r.errors.iter().find(|e| e.0 == n).map(|e| moments(&e.1));
-        let shared = row.errors.iter().rev().find_map(|(n, e)| Some((at(before, *n)?, moments(e))));
         Some(Verdict {
             scene: row.scene.clone(),
             method: row.method.clone(),
             time: change(time(before), time(row), TIME_TOLERANCE),
-            error: shared.map(|(old, new)| change(old, new, ERROR_TOLERANCE)),
+            error: error_change(&before.errors, &row.errors),
+            block_error: error_change(&before.block_errors, &row.block_errors),
         })
     };
     new.iter().filter_map(pair).collect()
@@ -166,6 +189,7 @@ mod tests {
             seconds_per_iteration: seconds.into(),
             calibration,
             errors: vec![(4, [1.0; 3].into()), (8, errors.into())],
+            block_errors: vec![(8, errors.map(|e| 0.01 * e).into())],
             non_finite: 0,
         }
     }
@@ -175,6 +199,8 @@ mod tests {
         let old = row([1.0, 1.01, 0.99], 10.0, [0.5, 0.51, 0.49]);
         let verdict = |new: Row| {
             let v = against(std::slice::from_ref(&old), &[new]).pop().unwrap();
+            assert_eq!(v.error.unwrap().regression, v.block_error.unwrap().regression);
+            assert_eq!(v.is_worse(), v.time.regression || v.error.unwrap().regression);
             (v.time.regression, v.error.unwrap().regression)
         };
         assert_eq!(verdict(old.clone()), (false, false));

@@ -4,7 +4,8 @@
 //! stands.
 
 use crate::image::flip::ldr_flip;
-use crate::image::metrics::pixel_errors;
+use crate::image::metrics::picture_errors;
+use crate::image::regions::RegionErrors;
 use crate::prepared::PreparedScene;
 use crate::render::schedule::EqualTime;
 use crate::render::{Estimator, Method, run_iterations};
@@ -25,6 +26,9 @@ pub struct Point {
     pub relmse: f64,
     /// Mean of d² / (r² + 0.01) without the worst 0.1 % of the pixels.
     pub relmse_trimmed: f64,
+    /// relMSE of means of regions.
+    #[serde(flatten)]
+    pub regions: RegionErrors,
     /// Mean of |d|.
     pub l1: f64,
     /// Mean of d².
@@ -62,7 +66,7 @@ impl Run {
     fn measure(&mut self, estimator: &Estimator, reference: &[[f64; 3]]) {
         let film = &estimator.film;
         let picture = film.mean_f64();
-        let e = pixel_errors(&picture, reference);
+        let e = picture_errors(&picture, reference, film.width as usize);
         // Equal black in both pictures keeps a non-finite pixel from spreading through ꟻLIP's filters.
         let finite = |p: &[f64; 3]| p.iter().all(|v| v.is_finite());
         let pair = picture.iter().zip(reference).map(|(a, b)| if finite(b) { (*a, *b) } else { ([0.0; 3], [0.0; 3]) });
@@ -74,6 +78,7 @@ impl Run {
             mape: e.mape,
             relmse: e.relmse,
             relmse_trimmed: e.relmse_trimmed,
+            regions: e.regions,
             l1: e.mae,
             mse: e.mse,
             flip: flip.iter().sum::<f64>() / (flip.len() as f64 - e.non_finite as f64),

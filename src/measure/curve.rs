@@ -14,9 +14,13 @@ pub struct Measure {
 }
 
 /// Every measure that has a curve.
-pub const MEASURES: [Measure; 5] = [
+pub const MEASURES: [Measure; 9] = [
     Measure { key: "relmse", name: "relMSE", of: |p| p.relmse },
     Measure { key: "relmse_trimmed", name: "relMSE trimmed", of: |p| p.relmse_trimmed },
+    Measure { key: "relmse_8x8", name: "relMSE of 8x8 blocks", of: |p| p.regions.relmse_8x8 },
+    Measure { key: "relmse_16x16", name: "relMSE of 16x16 blocks", of: |p| p.regions.relmse_16x16 },
+    Measure { key: "relmse_32x32", name: "relMSE of 32x32 blocks", of: |p| p.regions.relmse_32x32 },
+    Measure { key: "relmse_whole", name: "relMSE of the whole picture", of: |p| p.regions.relmse_whole },
     Measure { key: "mape", name: "MAPE", of: |p| p.mape },
     Measure { key: "l1", name: "L1", of: |p| p.l1 },
     Measure { key: "flip", name: "FLIP", of: |p| p.flip },
@@ -184,6 +188,7 @@ pub fn csv<'a>(scenes: impl Iterator<Item = (&'a str, &'a [Run])>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::regions::RegionErrors;
 
     fn run(method: &str, seed: u64, error: impl Fn(f64) -> f64, rate: f64) -> Run {
         let points = [1, 2, 4, 8, 16, 23].map(|n| {
@@ -194,6 +199,7 @@ mod tests {
                 mape: e,
                 relmse: e,
                 relmse_trimmed: e,
+                regions: RegionErrors { relmse_8x8: e, relmse_16x16: e, relmse_32x32: e, relmse_whole: e },
                 l1: e,
                 mse: e,
                 flip: e,

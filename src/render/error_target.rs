@@ -11,12 +11,12 @@ use super::estimator::Estimator;
 use super::iterations::{CurrentError, Schedule, Stop, Turn};
 use super::schedule::{Alternate, Budget, total_iterations};
 use crate::film::Film;
-use crate::image::metrics::{PixelErrors, pixel_errors};
+use crate::image::metrics::{PictureErrors, picture_errors};
 use crate::math::hash::mix64;
 use std::time::Duration;
 
 /// Reads one measure out of all.
-type Selector = fn(&PixelErrors) -> f64;
+type Selector = fn(&PictureErrors) -> f64;
 
 /// The error at which a render ends.
 #[derive(Clone, Copy, Debug)]
@@ -29,9 +29,13 @@ pub struct ErrorTarget {
 }
 
 /// Measures that can be estimated.
-const MEASURES: [(&str, Selector); 6] = [
+const MEASURES: [(&str, Selector); 10] = [
     ("relmse", |e| e.relmse),
     ("relmse_trimmed", |e| e.relmse_trimmed),
+    ("relmse_8x8", |e| e.regions.relmse_8x8),
+    ("relmse_16x16", |e| e.regions.relmse_16x16),
+    ("relmse_32x32", |e| e.regions.relmse_32x32),
+    ("relmse_whole", |e| e.regions.relmse_whole),
     ("mape", |e| e.mape),
     ("mae", |e| e.mae),
     ("mse", |e| e.mse),
@@ -68,7 +72,7 @@ impl ErrorTarget {
         let pictures = [a.mean_f64(), b.mean_f64()];
         let both = pictures[0].iter().zip(&pictures[1]);
         let mean: Vec<[f64; 3]> = both.map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
-        (self.select)(&pixel_errors(&pictures[0], &mean))
+        (self.select)(&picture_errors(&pictures[0], &mean, a.width as usize))
     }
 }
 

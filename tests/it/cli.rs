@@ -260,7 +260,8 @@ fn a_checkpoint_is_resumed_by_earlier_names() {
 #[test]
 fn info_writes_the_skeleton() {
     let sandbox = Sandbox::new();
-    let run = sandbox.run("info scene.xml --skeleton s.ply --skeleton-image s.png --voxel-resolution 30").expect(0, &[]);
+    let run =
+        sandbox.run("info scene.xml --skeleton s.ply --skeleton-image s.png --voxel-resolution 30").expect(0, &[]);
     let row = run.stdout.lines().find_map(|l| l.strip_prefix("skeleton")).unwrap_or_default().trim();
     let nodes: usize = row.split(' ').next().and_then(|n| n.parse().ok()).unwrap();
     let ply = std::fs::read_to_string(sandbox.path("s.ply")).unwrap();

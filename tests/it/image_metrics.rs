@@ -3,7 +3,7 @@
 //! pictures of 64 x 48 pixels made by the formulas below, which use only operations that are exact or rounded once.
 
 use lightsieve::image::flip::{hdr_flip, ldr_flip};
-use lightsieve::image::metrics::pixel_errors;
+use lightsieve::image::metrics::picture_errors;
 use lightsieve::image::z_test::z_test;
 use lightsieve::image::{Image, Pixels, SizeMismatch, compare};
 use lightsieve::measure::reference::OwnError;
@@ -118,7 +118,7 @@ fn close(name: &str, found: f64, expected: f64) {
 }
 
 #[test]
-fn pixel_errors_agree_with_numpy() {
+fn picture_errors_agree_with_numpy() {
     let r = compare(&noisy_bands(), &picture(bands)).unwrap();
     close("mse", r.mse, 3.003285392795731);
     close("rmse", r.rmse, 1.7329989592598523);
@@ -180,7 +180,7 @@ fn non_finite_pixels_are_counted_and_left_out() {
     let kept = |image: &Image| -> Vec<[f64; 3]> {
         colours(image).into_iter().enumerate().filter(|(i, _)| !left_out.contains(i)).map(|(_, p)| p).collect()
     };
-    let expected = pixel_errors(&kept(&noisy_bands()), &kept(&picture(bands)));
+    let expected = picture_errors(&kept(&noisy_bands()), &kept(&picture(bands)), 1);
     assert_eq!((found.mse, found.relmse, found.mean_ratio), (expected.mse, expected.relmse, expected.mean_ratio));
     // Three pixels of three thousand hardly change the mean.
     assert!((found.hdr_flip - 0.134).abs() < 0.002 && found.flip.is_finite());
@@ -215,7 +215,21 @@ fn sizes_must_agree() {
 fn the_report_has_the_promised_keys() {
     let json = serde_json::to_value(compare(&picture(bands), &picture(bands)).unwrap()).unwrap();
     let keys: Vec<&str> = json.as_object().unwrap().keys().map(String::as_str).collect();
-    let expected =
-        ["mse", "rmse", "mae", "mape", "relmse", "relmse_trimmed", "flip", "hdr_flip", "mean_ratio", "non_finite"];
+    let expected = [
+        "mse",
+        "rmse",
+        "mae",
+        "mape",
+        "relmse",
+        "relmse_trimmed",
+        "relmse_8x8",
+        "relmse_16x16",
+        "relmse_32x32",
+        "relmse_whole",
+        "flip",
+        "hdr_flip",
+        "mean_ratio",
+        "non_finite",
+    ];
     assert_eq!(keys, expected);
 }

@@ -3,8 +3,8 @@
 use crate::support::program::{BOX, Run, Sandbox};
 use lightsieve::film::Film;
 use lightsieve::image::ExrFile;
-use lightsieve::image::metrics::pixel_errors;
-use lightsieve::integrators::{Iteration, Params, path};
+use lightsieve::image::metrics::picture_errors;
+use lightsieve::integrators::{Iteration, Params, lvc, path};
 use lightsieve::load::{LoadOptions, load_scene};
 use lightsieve::prepared::{PrepareOptions, PreparedScene};
 use lightsieve::ray::Backend;
@@ -118,6 +118,39 @@ struct Silent;
 
 impl Observer for Silent {}
 
+/// A picture of this size has few blocks: the estimate is the true error on the average over seeds, with independent pixels and with light
+/// sub-paths that all pixels share.
+#[test]
+fn the_estimated_error_of_blocks_is_the_true_one() {
+    const PAIRS: u64 = 24;
+    let sandbox = Sandbox::new();
+    let scene = prepared(&sandbox, 32);
+    let mut reference = Estimator::new((path::SPEC.build)(&path_params()), scene.window, 1000);
+    for _ in 0..4096 {
+        reference.iterate(&scene);
+    }
+    let reference = reference.film.mean_f64();
+    let target = ErrorTarget::parse("relmse_8x8=1").unwrap();
+    for spec in [&path::SPEC, &lvc::SPEC] {
+        let params = Params::with(spec, &[("max_depth", "5")]).unwrap();
+        let film = |seed: u64| {
+            let mut estimator = Estimator::new((spec.build)(&params), scene.window, seed);
+            (0..16).for_each(|_| drop(estimator.iterate(&scene)));
+            estimator.film
+        };
+        let (mut estimates, mut truth) = (0.0, 0.0);
+        for pair in 0..PAIRS {
+            let (a, b) = (film(2 * pair), film(2 * pair + 1));
+            estimates += target.estimate(&a, &b);
+            let mut both = Film::new(scene.window);
+            both.add(&a);
+            both.add(&b);
+            truth += picture_errors(&both.mean_f64(), &reference, both.width as usize).regions.relmse_8x8;
+        }
+        assert!((estimates / truth - 1.0).abs() < 0.2, "{}: {estimates} {truth}", spec.name);
+    }
+}
+
 #[test]
 fn the_estimated_error_is_the_true_one() {
     let sandbox = Sandbox::new();
@@ -140,7 +173,8 @@ fn the_estimated_error_is_the_true_one() {
             assert_eq!(rendered.outcome.stop, Stop::Converged, "{key}");
             assert!(film.iterations() < 4096 && rendered.outcome.iterations == film.iterations());
             let estimate = rendered.error.unwrap().estimate.unwrap();
-            let errors = serde_json::to_value(pixel_errors(&film.mean_f64(), &reference)).unwrap();
+            let errors =
+                serde_json::to_value(picture_errors(&film.mean_f64(), &reference, film.width as usize)).unwrap();
             let truth = number(&errors[key]);
             assert!(estimate < value, "{key}: {estimate}");
             assert!((estimate / truth - 1.0).abs() < 0.2, "{key}: by estimate {estimate}, in truth {truth}");
@@ -190,7 +224,9 @@ fn convergence_is_measured_and_reported() {
         assert_eq!(points[0]["iterations"], 1);
         let (first, last) = (&points[0], points.last().unwrap());
         assert!(number(&last["seconds"]) >= number(&first["seconds"]) && number(&last["relmse"]) > 0.0);
-        for key in ["mape", "relmse", "relmse_trimmed", "l1", "mse", "flip", "mean_ratio"] {
+        for key in
+            ["mape", "relmse", "relmse_trimmed", "relmse_16x16", "relmse_whole", "l1", "mse", "flip", "mean_ratio"]
+        {
             assert!(number(&last[key]).is_finite(), "{key}");
         }
         assert!(points.windows(2).all(|p| p[0]["iterations"].as_u64() < p[1]["iterations"].as_u64()));
@@ -213,7 +249,7 @@ fn convergence_is_measured_and_reported() {
     let names: Vec<&str> =
         pictures[0]["pictures"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["path", "bdpt:heuristic=power,max_depth=4", "reference"]);
-    assert_eq!(page.matches("<svg").count(), 5);
+    assert_eq!(page.matches("<svg").count(), 9);
     assert!(page.contains("lightsieve converge scene.xml"));
 
     // The second time the reference is there already; its time stamp tells.
