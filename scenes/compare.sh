@@ -15,6 +15,7 @@
 #   proposals    proposal models                (weights), section 5.2; and target functions
 #   first-stage  M_1 = 10^3 ... 10^5            (two stages), Fig. 6
 #   last-stage   M_2 = 50 ... 800               (two stages), Fig. 7
+#   regions      first stage with and without learned visibility, M_2, path: errors of blocks of pixels
 #
 # SCENES are names in this folder or scene files; references are rendered once and kept. With the defaults this takes hours; less of
 # everything is quicker:
@@ -66,6 +67,7 @@ for figure in ${FIGURES:-}; do
         done
         ;;
     first-stage) for m in 1000 10000 100000; do add "two-stage:presampled_paths=$m"; done ;;
+    regions) add two-stage:first_stage=unoccluded,second_stage_paths=200 two-stage:first_stage=unoccluded two-stage path ;;
     last-stage) for m in 50 100 200 400 800; do add "two-stage:second_stage_paths=$m"; done ;;
     *)
         echo "compare.sh: no figure is called $figure" >&2

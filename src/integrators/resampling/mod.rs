@@ -5,6 +5,7 @@
 //! `strategy` draws, `pmfs` and `cache_points` hold the probabilities, `models` tells weights what they know.
 
 mod cache_points;
+mod learned_visibility;
 mod models;
 mod params;
 mod path_count;
@@ -93,6 +94,7 @@ fn build(params: &Params, paths: u32, second_stage: Option<u32>) -> Box<dyn Inte
         metric: if params.is("metric", "position") || asks_caches { Metric::Plain } else { Metric::Facing },
         radiance: params.is("target", "radiance") && model != FactorModel::PerCache,
         per_cache: model == FactorModel::PerCache,
+        learned_visibility: second_stage.is_some() && params.is("first_stage", "learned-visibility"),
         two_stage_weights: second_stage.is_some() && params.is("weights", "two-stage"),
     };
     let common = bidirectional::resampled_settings(params, params.techniques("techniques"));

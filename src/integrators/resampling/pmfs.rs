@@ -5,6 +5,11 @@
 //! group, and one is drawn from each: Y_j of cluster C_j with P₁ = (f_y/p)(Y_j) / S_j, S_j = Σ over C_j of f_y/p
 //! (Nabata et al. 2020, "Two-stage resampling", §5.1).
 //!
+//! The cut splits clusters by the range of 1/d² over them, and by the share of their vertices that the group has seen
+//! in earlier iterations (`learned_visibility`).
+//!
+//! DEVIATION: the first stage there ignores visibility. Of the M₂ candidates behind a door few are seen through it.
+//!
 //! Every cache point then has a pmf P₂(j) of its entries, proportional to q̂₂/(p P₁): the light that the entry brings
 //! to the cache point, visibility included, times the number of vertices that the entry represents.
 //!
@@ -14,13 +19,14 @@
 //! Shadow rays go out in packets, from all points of a group to one light vertex.
 
 use super::cache_points::{CachePoints, FoundLight};
+use super::learned_visibility::{Octree, SeenCells};
 use crate::bidir::VertexStore;
 use crate::math::cdf::CdfRows;
 use crate::math::hash::HashRng;
 use crate::path::{Iteration, streams};
 use crate::ray::offset::segment;
 use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
-use crate::spatial::light_tree::{CutLimits, CutScratch};
+use crate::spatial::light_tree::{Aabb, CutLimits, CutScratch, ReceiverBounds};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -49,6 +55,18 @@ pub(super) struct GroupPmf {
     /// For each cache point, the light that it found.
     found: Vec<FoundLight>,
     ranges: Vec<Range<usize>>,
+    /// What the group has seen in earlier iterations.
+    seen_cells: SeenCells,
+}
+
+/// How candidates are drawn from the light vertices of an iteration.
+#[derive(Clone, Copy)]
+struct FirstStage<'a> {
+    store: &'a VertexStore,
+    /// M₂.
+    clusters: usize,
+    /// Cells by which groups remember what they saw, if cuts go by it.
+    octree: Option<&'a Octree>,
 }
 
 /// Memory of one thread, to be used again.
@@ -74,6 +92,8 @@ pub(super) struct Selection {
 #[derive(Debug, Default)]
 pub(super) struct Pmfs {
     groups: Vec<GroupPmf>,
+    /// Cells by which groups remember what they saw, if cuts go by it.
+    octree: Option<Octree>,
     /// For each cache point its group.
     group_of: Vec<u32>,
 }
@@ -98,15 +118,18 @@ impl GroupPmf {
     /// The first stage: draws one vertex of each cluster of a cut.
     fn draw_entries(
         &mut self,
-        caches: &CachePoints,
-        group: &Range<usize>,
-        store: &VertexStore,
-        clusters: usize,
+        stage: &FirstStage,
+        receivers: &ReceiverBounds,
         rng: &mut HashRng,
-        memory: &mut CutScratch,
+        cut: &mut CutScratch,
     ) {
+        let FirstStage { store, clusters, octree } = *stage;
         let limits = CutLimits { max_clusters: clusters, max_error: 0.0 };
-        store.tree.cut(&caches.receiver_bounds(group), limits, memory, &mut self.ranges);
+        let importance = |cluster: &Aabb| match octree {
+            Some(octree) => self.seen_cells.importance(octree.cell_around(cluster)),
+            None => 1.0,
+        };
+        store.tree.cut(receivers, limits, importance, cut, &mut self.ranges);
         self.entries.clear();
         self.entries.extend(self.ranges.iter().filter_map(|cluster| {
             let (vertex, p) = store.tree.sample_in(cluster, rng.next_f32())?;
@@ -197,6 +220,7 @@ impl Pmfs {
         set: u64,
     ) -> RayStats {
         self.groups.resize_with(caches.groups.len(), GroupPmf::default);
+        let octree = self.octree.as_ref();
         if self.group_of.len() != caches.len() {
             let number = |(g, range): (usize, &Range<usize>)| std::iter::repeat_n(g as u32, range.len());
             self.group_of = caches.groups.iter().enumerate().flat_map(number).collect();
@@ -207,7 +231,8 @@ impl Pmfs {
                 None => pmf.count = store.len(),
                 Some(clusters) => {
                     let mut rng = HashRng::new(iteration.seed, streams::FIRST_STAGE, number as u64, set);
-                    pmf.draw_entries(caches, group, store, clusters, &mut rng, &mut scratch.cut);
+                    let stage = FirstStage { store, clusters, octree };
+                    pmf.draw_entries(&stage, &caches.receiver_bounds(group), &mut rng, &mut scratch.cut);
                     pmf.count = pmf.entries.len();
                 }
             }
@@ -219,6 +244,36 @@ impl Pmfs {
             a.merge(&b);
             a
         })
+    }
+
+    /// Cuts of the first stage go by what groups saw in earlier iterations, of a scene of this radius.
+    pub fn learn_visibility(&mut self, radius: f32) {
+        self.octree = Some(Octree::new(radius));
+    }
+
+    /// Remembers what the groups saw of the vertices of `store`, whose pmfs were found last.
+    pub fn learn(&mut self, caches: &CachePoints, store: &VertexStore) {
+        let Some(octree) = &self.octree else { return };
+        self.groups.par_iter_mut().zip(&caches.groups).for_each(|(group, range)| {
+            for (entry, seen) in group.entries.iter().zip(&group.seen) {
+                let cell = octree.cell(store.vertex(entry.vertex as usize).place.position());
+                group.seen_cells.add(cell, range.len() as u32, seen.count_ones());
+            }
+        });
+    }
+
+    /// What each group saw so far.
+    pub fn seen_cells(&self) -> impl Iterator<Item = &SeenCells> {
+        self.groups.iter().map(|group| &group.seen_cells)
+    }
+
+    /// Goes on from what groups saw in an earlier run; false if it is of other groups.
+    pub fn restore(&mut self, seen: Vec<SeenCells>) -> bool {
+        let fits = seen.len() == self.groups.len() && seen.iter().all(SeenCells::is_whole);
+        if fits {
+            self.groups.iter_mut().zip(seen).for_each(|(group, seen)| group.seen_cells = seen);
+        }
+        fits
     }
 
     /// For every cache point, the light found in this iteration.

@@ -20,6 +20,7 @@
 //! over the same M₂ vertices; P is then P₁ P₂ (Nabata et al. 2020, "Two-stage resampling").
 
 use super::cache_points::{CachePoints, FoundLight};
+use super::learned_visibility::SeenCells;
 use super::models::CacheFactor;
 use super::path_count::{EYE_COST, VERTEX_COST, best_path_count};
 use super::pmfs::{Pmfs, Selection};
@@ -81,6 +82,8 @@ struct SavedCaches {
     sums: Vec<FoundLight>,
     iterations: u64,
     counted: VertexCount,
+    /// For each group of cache points.
+    seen: Vec<SeenCells>,
 }
 
 /// The strategy, with weights by the factor `F`.
@@ -199,6 +202,9 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
         let eye_rays = stats.rays(&[RayKind::Cache]) / (pixels * self.settings.cache_fraction).max(1.0);
         let paths = if self.settings.paths > 0 { self.settings.paths } else { pixels as u32 }.min(WarmUp::MAX_PATHS);
         let second_stage = self.settings.second_stage.map(|m2| m2 as usize);
+        if second_stage.is_some() && self.settings.learned_visibility {
+            self.caches.pmfs.learn_visibility(warm_up.iteration.scene.radius);
+        }
         let mut light_rays = 0.0;
         for set in 1..=WarmUp::SETS {
             let (store, s) = warm_up.light_vertices(paths, set, second_stage.is_some());
@@ -208,6 +214,7 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
             let (iteration, pmfs) = (&warm_up.iteration, &mut self.caches.pmfs);
             stats.merge(&pmfs.find(iteration, &points, &store, second_stage, u64::MAX - set));
             points.learn(pmfs.found());
+            pmfs.learn(&points, &store);
             self.counted.add(&store);
         }
         if self.settings.paths == 0 {
@@ -228,6 +235,7 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
     fn learn(&mut self, store: &VertexStore) {
         if let Some(points) = &mut self.caches.points {
             points.learn(self.caches.pmfs.found());
+            self.caches.pmfs.learn(points, store);
             self.counted.add(store);
         }
     }
@@ -287,14 +295,15 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
 
     fn save(&self) -> Vec<u8> {
         let Some((sums, iterations)) = self.caches.points.as_ref().map(CachePoints::sums) else { return vec![] };
-        let saved = SavedCaches { sums: sums.to_vec(), iterations, counted: self.counted };
+        let seen = self.caches.pmfs.seen_cells().cloned().collect();
+        let saved = SavedCaches { sums: sums.to_vec(), iterations, counted: self.counted, seen };
         postcard::to_allocvec(&saved).unwrap_or_default()
     }
 
     fn restore(&mut self, state: &[u8]) -> bool {
         let Some(points) = &mut self.caches.points else { return state.is_empty() };
-        let Ok(SavedCaches { sums, iterations, counted }) = postcard::from_bytes(state) else { return false };
+        let Ok(SavedCaches { sums, iterations, counted, seen }) = postcard::from_bytes(state) else { return false };
         self.counted = counted;
-        points.restore(sums, iterations)
+        points.restore(sums, iterations) && self.caches.pmfs.restore(seen)
     }
 }

@@ -14,6 +14,7 @@ const PARAMS: &[ParamSpec] = &[
     TECHNIQUES,
     params::FIRST_STAGE_PATHS,
     params::SECOND_STAGE_PATHS,
+    params::FIRST_STAGE,
     CONNECTIONS_PER_VERTEX,
     params::NEAREST_CACHES,
     params::GROUPED_CACHE_DENSITY,
@@ -36,7 +37,8 @@ pub static TWO_STAGE: IntegratorSpec = IntegratorSpec {
         of them to each group of cache points; a second stage resamples those with visibility. It is the first choice for \
         interiors that are hard to light.\n\n\
         Nabata, Iwasaki and Dobashi 2020, \"Two-stage resampling for bidirectional path tracing with multiple light \
-        sub-paths\". As published: rr_scale=1, allocation=full, proposal_model=per-cache, presampled_paths=10000, \
+        sub-paths\". As published: rr_scale=1, allocation=full, proposal_model=per-cache, first_stage=unoccluded, \
+        presampled_paths=10000, second_stage_paths=200, \
         cache_density=0.4%.",
     params: &[PARAMS],
     unbiased: true,

@@ -84,11 +84,12 @@ impl<C: LightCluster> LightTree<C> {
     }
 
     /// The clusters of a cut for `receivers`: ranges of sources, left in `clusters` in ascending order. They are a
-    /// partition of all sources.
+    /// partition of all sources. The error bound of a cluster is multiplied by its `importance`, which is not negative.
     pub fn cut(
         &self,
         receivers: &ReceiverBounds,
         limits: CutLimits,
+        importance: impl Fn(&C) -> f32,
         scratch: &mut CutScratch,
         clusters: &mut Vec<Range<usize>>,
     ) {
@@ -100,7 +101,7 @@ impl<C: LightCluster> LightTree<C> {
             clusters.push(root.range());
             return;
         }
-        heap.push(CutNode { error: self.error_bound(root, receivers), node: 0 });
+        heap.push(CutNode { error: self.error_bound(root, receivers) * importance(&root.cluster), node: 0 });
         while clusters.len() + heap.len() < limits.max_clusters {
             if heap.peek().is_none_or(|worst| worst.error < limits.max_error) {
                 break;
@@ -112,7 +113,10 @@ impl<C: LightCluster> LightTree<C> {
                 if node.is_leaf() {
                     clusters.push(node.range());
                 } else {
-                    heap.push(CutNode { error: self.error_bound(node, receivers), node: number });
+                    heap.push(CutNode {
+                        error: self.error_bound(node, receivers) * importance(&node.cluster),
+                        node: number,
+                    });
                 }
             }
         }

@@ -126,7 +126,7 @@ fn cuts_are_partitions_and_their_sums_are_the_whole() {
         let total: f64 = points.iter().map(|p| f64::from(p.weight)).sum();
         let (mut scratch, mut cut) = (CutScratch::default(), vec![]);
         for clusters in [1, 2, 16, 200, 5000] {
-            tree.cut(&RECEIVERS, by_count(clusters), &mut scratch, &mut cut);
+            tree.cut(&RECEIVERS, by_count(clusters), |_| 1.0, &mut scratch, &mut cut);
             assert!(cut.len() <= clusters, "{n} {clusters}: {}", cut.len());
             assert!(cut.len() >= clusters.min(points.len() / MIN_VPL_LEAF / 2), "{n} {clusters}: {}", cut.len());
             let mut next = 0;
@@ -167,7 +167,7 @@ fn cuts_are_fine_where_they_are_near() {
     let (tree, points) = vpl_tree(3000, 4);
     let receivers = ReceiverBounds { centre: Vec3::new(0.0, 5.0, 5.0), radius: 0.2, normal: Vec3::ZERO };
     let (mut scratch, mut cut) = (CutScratch::default(), vec![]);
-    tree.cut(&receivers, by_count(100), &mut scratch, &mut cut);
+    tree.cut(&receivers, by_count(100), |_| 1.0, &mut scratch, &mut cut);
     let size = |near: bool| {
         let own: Vec<usize> = cut
             .iter()
@@ -187,7 +187,7 @@ fn an_error_bound_ends_a_cut_and_holds() {
     let (mut scratch, mut cut) = (CutScratch::default(), vec![]);
     let mut sizes = vec![];
     for max_error in [10.0, 1.0, 0.1] {
-        tree.cut(&RECEIVERS, CutLimits { max_clusters: usize::MAX, max_error }, &mut scratch, &mut cut);
+        tree.cut(&RECEIVERS, CutLimits { max_clusters: usize::MAX, max_error }, |_| 1.0, &mut scratch, &mut cut);
         sizes.push(cut.len());
         for range in cut.iter().filter(|range| range.len() > 1) {
             // No receiver and no two sources of a cluster may differ by more than the bound, above the softening within
