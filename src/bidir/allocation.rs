@@ -4,13 +4,13 @@
 //! and the variance of other numbers (`mis::allocation`); the best allocation holds from then on. No group is ever
 //! given up: light that the first iterations did not meet could be rare and bright, so that a sixteenth of the
 //! connections and a sixteenth or, where they serve the light image only, a sixty-fourth of the light sub-paths always
-//! stay. Nor do too many pixels share one: their noise is alike, and no sum of squares tells. The decision depends on
+//! stay. The decision depends on
 //! earlier iterations only, so every iteration is unbiased, and on counts of rays instead of times, so it is the same
 //! for any machine.
 
 use super::contribution::Contribution;
 use crate::film::{Film, TILE};
-use crate::mis::allocation::{Probe, WeightedContribution};
+use crate::mis::allocation::{LightSharing, Probe, RegionVariance, WeightedContribution};
 use crate::mis::{AllocationCosts, EfficiencyEstimator, SampleAllocation};
 use crate::ray::{RayKind, RayStats};
 use serde::{Deserialize, Serialize};
@@ -63,6 +63,7 @@ struct AllocationState {
 pub struct AllocationOptimizer {
     candidates: Vec<SampleAllocation>,
     ray_costs: RayCosts,
+    sharing: LightSharing,
     state: AllocationState,
 }
 
@@ -84,9 +85,9 @@ pub struct ProbedIteration<'a> {
 
 impl AllocationOptimizer {
     /// Undecided among `candidates`.
-    pub fn new(candidates: Vec<SampleAllocation>, ray_costs: RayCosts) -> AllocationOptimizer {
+    pub fn new(candidates: Vec<SampleAllocation>, ray_costs: RayCosts, sharing: LightSharing) -> AllocationOptimizer {
         let state = AllocationState { estimator: None, costs: AllocationCosts::default(), probed: 0, decided: None };
-        AllocationOptimizer { candidates, ray_costs, state }
+        AllocationOptimizer { candidates, ray_costs, sharing, state }
     }
 
     /// The allocation of iteration `index`.
@@ -127,11 +128,10 @@ impl AllocationOptimizer {
         let ProbedIteration { film, film_size, contributions, stride, .. } = *probed;
         let columns = film.width.div_ceil(TILE);
         let pixels = (film_size[0] * film_size[1]).div_ceil(stride);
-        let candidates = &self.candidates;
-        let estimator = self
-            .state
-            .estimator
-            .get_or_insert_with(|| EfficiencyEstimator::new(candidates.clone(), film.tiles.len(), pixels as usize));
+        let (candidates, sharing) = (&self.candidates, self.sharing);
+        let estimator = self.state.estimator.get_or_insert_with(|| {
+            EfficiencyEstimator::new(candidates.clone(), film.tiles.len(), pixels as usize, sharing)
+        });
         let region_of = |(x, y): (u32, u32)| {
             let (x, y) = (x.wrapping_sub(film.x0), y.wrapping_sub(film.y0));
             (x < film.width && y < film.height).then(|| (y / TILE * columns + x / TILE) as usize)
@@ -187,8 +187,8 @@ impl AllocationOptimizer {
 #[serde(transparent)]
 pub struct SavedAllocation(AllocationState);
 
-/// For each tile the sum over samples of their variance, and its mean, squared.
-fn variances(film: &Film, iterations: u64) -> Vec<(f64, f64)> {
+/// The samples of each tile.
+fn variances(film: &Film, iterations: u64) -> Vec<RegionVariance> {
     let n = iterations as f64;
     film.tiles
         .iter()
@@ -199,7 +199,8 @@ fn variances(film: &Film, iterations: u64) -> Vec<(f64, f64)> {
                 variance += (q - s * s / n).max(0.0) / (n - 1.0) * n / 3.0;
                 sum += s / (3.0 * n);
             }
-            (variance, (sum / f64::from(tile.pixels())).powi(2))
+            let pixels = f64::from(tile.pixels());
+            RegionVariance { pixels, variance, mean2: (sum / pixels).powi(2) }
         })
         .collect()
 }
@@ -211,12 +212,12 @@ mod tests {
     #[test]
     fn a_state_survives_saving() {
         let candidates = combinations(&[1.0, 0.25], &[1.0, 0.5]);
-        let mut one = AllocationOptimizer::new(candidates.clone(), RayCosts::OWN_SUBPATH);
+        let mut one = AllocationOptimizer::new(candidates.clone(), RayCosts::OWN_SUBPATH, LightSharing::OfPixels);
         one.state.costs.base = 3.0;
         one.state.probed = 1;
-        one.state.estimator = Some(EfficiencyEstimator::new(candidates.clone(), 4, 7));
+        one.state.estimator = Some(EfficiencyEstimator::new(candidates.clone(), 4, 7, LightSharing::OfPixels));
         let bytes = postcard::to_allocvec(&one.save()).unwrap();
-        let mut other = AllocationOptimizer::new(candidates, RayCosts::OWN_SUBPATH);
+        let mut other = AllocationOptimizer::new(candidates, RayCosts::OWN_SUBPATH, LightSharing::OfPixels);
         assert!(!other.restore(postcard::from_bytes(&bytes).unwrap(), 5), "of another film");
         assert!(other.restore(postcard::from_bytes(&bytes).unwrap(), 4));
         assert_eq!(postcard::to_allocvec(&other.save()).unwrap(), bytes);

@@ -5,7 +5,7 @@ use super::{Integrator, Iteration, Params, Replay};
 use crate::bidir::allocation::combinations;
 use crate::bidir::{AllocationOptimizer, BidirSettings, Bidirectional, ConnectionStrategy, RayCosts};
 use crate::film::{Film, Pyramid};
-use crate::mis::{Heuristic, Techniques};
+use crate::mis::{Heuristic, LightSharing, Techniques};
 use crate::path::PathLimits;
 use crate::ray::RayStats;
 
@@ -37,7 +37,8 @@ pub fn resampled_settings(params: &Params, techniques: Techniques) -> BidirSetti
 /// Decides the allocation of a method that draws connections from many light sub-paths, if the parameters ask for it.
 pub fn optimizer(params: &Params) -> Option<AllocationOptimizer> {
     let candidates = || combinations(&[1.0, 0.25, 0.0625, 0.015_625], &[1.0, 0.5, 0.25, 0.125, 0.0625]);
-    params.is("allocation", "auto").then(|| AllocationOptimizer::new(candidates(), RayCosts::SHARED_SUBPATHS))
+    let new = || AllocationOptimizer::new(candidates(), RayCosts::SHARED_SUBPATHS, LightSharing::OfIteration);
+    params.is("allocation", "auto").then(new)
 }
 
 impl<S: ConnectionStrategy> Integrator for Bidirectional<S> {

@@ -13,6 +13,13 @@
 //! variance at another one, but for the squares of single contributions: with fewer connections, each left out by
 //! itself, these fall by n′/n only once.
 //!
+//! Pixels that share light sub-paths are wrong together, and their mean keeps the error. With C the covariance of two
+//! pixels of a region, the mean of its B pixels has the variance (V + (B − 1) C) / B. What is minimised is the mean of
+//! the variance of pixels, V, and that of regions as it would be with independent pixels, V + (B − 1) C. From the
+//! differences Δ = X₁ − X₂ of m probed pixels of the region, C is estimated by [(Σ Δ)² − Σ Δ²] / (2 m (m − 1)). Where
+//! each pixel has a light sub-path of its own, the probes share none, but a candidate lets k pixels share one: then
+//! (k − 1) times the variance of connections is taken for (B − 1) C, as if it all came from the light sub-path.
+//!
 //! Sums are kept by region of the picture, so that each region counts relative to its own brightness.
 
 use super::weight::MisWeight;
@@ -78,6 +85,58 @@ fn square(value: [f64; 3]) -> f64 {
     value.into_iter().map(|v| v * v).sum::<f64>() / 3.0
 }
 
+/// The sample of a pixel as it would be at another allocation, as far as it is not left to chance.
+struct PredictedSample {
+    all: [f64; 3],
+    connections: [f64; 3],
+    /// Sum of the squares of its contributions.
+    squares: f64,
+}
+
+impl PredictedSample {
+    fn new(allocation: &SampleAllocation, contributions: &[WeightedContribution]) -> PredictedSample {
+        let mut sample = PredictedSample { all: [0.0; 3], connections: [0.0; 3], squares: 0.0 };
+        for c in contributions.iter().filter(|c| c.is_finite()) {
+            let present = if c.connection { f64::from(allocation.connections) } else { 1.0 };
+            let scale = present / allocation.density_ratio(&c.weight);
+            let value = c.value.to_array().map(|v| f64::from(v) * scale);
+            sample.squares += square(value);
+            (0..3).for_each(|i| sample.all[i] += value[i]);
+            if c.connection {
+                (0..3).for_each(|i| sample.connections[i] += value[i]);
+            }
+        }
+        sample
+    }
+
+    /// Twice the pixel's variance less the squares of its contributions, of both iterations together. The first
+    /// iteration's sample waits in `first`.
+    fn increase(&self, second: bool, first: &mut PixelSample, differences: &mut Differences) -> f64 {
+        if !second {
+            *first = PixelSample { all: self.all.map(|v| v as f32), connections: self.connections.map(|v| v as f32) };
+            return -self.squares;
+        }
+        let difference = |a: &[f64; 3], b: &[f32; 3]| std::array::from_fn(|i| a[i] - f64::from(b[i]));
+        let all: [f64; 3] = difference(&self.all, &first.all);
+        (0..3).for_each(|i| differences.sum[i] += all[i]);
+        differences.squares += square(all);
+        differences.connection_squares += square(difference(&self.connections, &first.connections));
+        // Twice ½ (X₁ − X₂)², since there are two samples.
+        square(all) - self.squares
+    }
+}
+
+/// The samples of a region at full allocation.
+#[derive(Clone, Copy, Debug)]
+pub struct RegionVariance {
+    /// Number of pixels.
+    pub pixels: f64,
+    /// Sum over samples of their variance.
+    pub variance: f64,
+    /// Square of their mean.
+    pub mean2: f64,
+}
+
 /// Estimates from samples at full allocation, for each region of the picture and every candidate, by how much the
 /// candidate would increase the variance.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -86,7 +145,46 @@ pub struct EfficiencyEstimator {
     /// For each region and candidate.
     increases: Vec<f64>,
     /// For each probed pixel, every candidate and full allocation, the sample of the first iteration.
-    first: Vec<[f32; 3]>,
+    first: Vec<PixelSample>,
+    /// For each region, its probed pixels.
+    probed: Vec<u32>,
+    /// For each region and candidate.
+    differences: Vec<Differences>,
+    /// How pixels come to share light sub-paths.
+    sharing: LightSharing,
+}
+
+/// How the pixels of a region come to share light sub-paths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LightSharing {
+    /// All eye vertices are connected to the light sub-paths of the iteration: probes show what this does.
+    OfIteration,
+    /// With a light image of 1/k, k pixels of a region have one sub-path together.
+    OfPixels,
+}
+
+/// A pixel's sample at some allocation.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct PixelSample {
+    all: [f32; 3],
+    connections: [f32; 3],
+}
+
+/// Differences Δ of two samples of the pixels of a region.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct Differences {
+    sum: [f64; 3],
+    squares: f64,
+    /// Σ Δ² of connections alone.
+    connection_squares: f64,
+}
+
+impl Differences {
+    /// C, from the differences of `pixels` pixels.
+    fn covariance(&self, pixels: u32) -> f64 {
+        let pairs = f64::from(pixels) * (f64::from(pixels) - 1.0);
+        if pairs > 0.0 { (square(self.sum) - self.squares) / (2.0 * pairs) } else { 0.0 }
+    }
 }
 
 /// A probed pixel in one of the two probing iterations.
@@ -105,10 +203,21 @@ const LEAST_GAIN: f64 = 0.9;
 
 impl EfficiencyEstimator {
     /// No samples yet, of `regions` regions and `pixels` probed pixels.
-    pub fn new(candidates: Vec<SampleAllocation>, regions: usize, pixels: usize) -> EfficiencyEstimator {
-        let (increases, first) =
-            (vec![0.0; regions * candidates.len()], vec![[0.0; 3]; pixels * (candidates.len() + 1)]);
-        EfficiencyEstimator { candidates, increases, first }
+    pub fn new(
+        candidates: Vec<SampleAllocation>,
+        regions: usize,
+        pixels: usize,
+        sharing: LightSharing,
+    ) -> EfficiencyEstimator {
+        let n = candidates.len();
+        EfficiencyEstimator {
+            candidates,
+            increases: vec![0.0; regions * n],
+            first: vec![PixelSample::default(); pixels * (n + 1)],
+            probed: vec![0; regions],
+            differences: vec![Differences::default(); regions * n],
+            sharing,
+        }
     }
 
     /// Adds a contribution of any technique in a region, which stands for `times` of its kind.
@@ -129,50 +238,51 @@ impl EfficiencyEstimator {
     pub fn add_sample(&mut self, probe: Probe, contributions: &[WeightedContribution], times: f64) {
         let Probe { region, pixel, second } = probe;
         let n = self.candidates.len();
-        let (Some(increases), Some(first)) = (
+        let (Some(increases), Some(first), Some(differences)) = (
             self.increases.get_mut(region * n..(region + 1) * n),
             self.first.get_mut(pixel * (n + 1)..(pixel + 1) * (n + 1)),
+            self.differences.get_mut(region * n..(region + 1) * n),
         ) else {
             return;
         };
-        let increase = |allocation: &SampleAllocation, first: &mut [f32; 3]| {
-            let (mut sum, mut squares) = ([0.0; 3], 0.0);
-            for c in contributions.iter().filter(|c| c.is_finite()) {
-                let present = if c.connection { f64::from(allocation.connections) } else { 1.0 };
-                let scale = present / allocation.density_ratio(&c.weight);
-                let value = c.value.to_array().map(|v| f64::from(v) * scale);
-                squares += square(value);
-                (0..3).for_each(|i| sum[i] += value[i]);
+        self.probed[region] += u32::from(second);
+        let full = PredictedSample::new(&SampleAllocation::FULL, contributions);
+        let full = first.last_mut().map_or(0.0, |first| full.increase(second, first, &mut Differences::default()));
+        let of_candidates = increases.iter_mut().zip(&self.candidates).zip(first).zip(differences);
+        for (((sum, allocation), first), differences) in of_candidates {
+            let sample = PredictedSample::new(allocation, contributions);
+            *sum += times * (sample.increase(second, first, differences) - full);
+        }
+    }
+
+    /// By how much sharing makes the mean of the variances of pixels and regions larger, summed over both samples of
+    /// all pixels of a region that has `pixels` of them.
+    fn shared_error(&self, region: usize, number: usize, pixels: f64) -> f64 {
+        let differences = &self.differences[region * self.candidates.len() + number];
+        let probed = self.probed[region];
+        match self.sharing {
+            LightSharing::OfIteration => pixels * (pixels - 1.0) * differences.covariance(probed),
+            LightSharing::OfPixels => {
+                let pixels_per_path = 1.0 / f64::from(self.candidates[number].light_image);
+                let times = pixels / f64::from(probed.max(1));
+                0.5 * (pixels_per_path - 1.0) * times * differences.connection_squares
             }
-            if !second {
-                *first = sum.map(|v| v as f32);
-                return -squares;
-            }
-            // Twice ½ (X₁ − X₂)², since there are two samples.
-            square(std::array::from_fn(|i| sum[i] - f64::from(first[i]))) - squares
-        };
-        let full = first.last_mut().map_or(0.0, |first| increase(&SampleAllocation::FULL, first));
-        for ((sum, allocation), first) in increases.iter_mut().zip(&self.candidates).zip(first) {
-            *sum += times * (increase(allocation, first) - full);
         }
     }
 
     /// The candidate with the least product of variance and cost, or of those that are nearly as good the one with most
-    /// connections. `variances` has for each region the sum over samples of their variance at full allocation, and of
-    /// its mean, squared, by which it counts; a share of the mean over all regions keeps dark ones from counting too
-    /// much.
-    pub fn best(&self, variances: &[(f64, f64)], costs: &AllocationCosts) -> SampleAllocation {
-        let overall = variances.iter().map(|v| v.1).sum::<f64>() / variances.len().max(1) as f64;
+    /// connections. A share of the mean over all regions keeps dark ones from counting too much.
+    pub fn best(&self, variances: &[RegionVariance], costs: &AllocationCosts) -> SampleAllocation {
+        let overall = variances.iter().map(|v| v.mean2).sum::<f64>() / variances.len().max(1) as f64;
         let product = |number: usize| {
             let increases = self.increases.chunks_exact(self.candidates.len());
-            let variance: f64 = increases
-                .zip(variances)
-                .map(|(increases, (variance, mean2))| {
-                    let scale = mean2 + 0.01 * overall;
-                    // An estimate of a variance from two samples may be negative.
-                    if scale > 0.0 { (variance + increases[number]).max(0.0) / scale } else { 0.0 }
-                })
-                .sum();
+            let relative = |(region, (increases, v)): (usize, (&[f64], &RegionVariance))| {
+                let scale = v.mean2 + 0.01 * overall;
+                let variance = v.variance + increases[number] + self.shared_error(region, number, v.pixels);
+                // An estimate of a variance from two samples may be negative.
+                if scale > 0.0 { variance.max(0.0) / scale } else { 0.0 }
+            };
+            let variance: f64 = increases.zip(variances).enumerate().map(relative).sum();
             variance * self.candidates[number].cost(costs)
         };
         let products: Vec<f64> = (0..self.candidates.len()).map(product).collect();
@@ -193,6 +303,8 @@ impl EfficiencyEstimator {
         self.candidates == candidates
             && self.increases.len() == regions * candidates.len()
             && self.first.len().is_multiple_of(candidates.len() + 1)
+            && self.probed.len() == regions
+            && self.differences.len() == self.increases.len()
     }
 }
 
@@ -223,7 +335,7 @@ mod tests {
             let n = [1.0, f64::from(e.light_image), f64::from(e.connections)];
             (0..20).map(|x| f(x).powi(2) / p(x).iter().zip(n).map(|(p, n)| p * n).sum::<f64>()).sum()
         };
-        let mut statistics = EfficiencyEstimator::new(candidates(), 1, 1);
+        let mut statistics = EfficiencyEstimator::new(candidates(), 1, 1, LightSharing::OfIteration);
         let mut rng = HashRng::new(1, 2, 3, 4);
         const N: usize = 400_000;
         for i in 0..N {
@@ -285,7 +397,7 @@ mod tests {
                 WeightedContribution { connection, ..contribution_of((f(k, at) / d) as f32, weight) }
             })
         };
-        let mut statistics = EfficiencyEstimator::new(candidates(), 1, 1);
+        let mut statistics = EfficiencyEstimator::new(candidates(), 1, 1, LightSharing::OfIteration);
         for (x, y, p) in all() {
             sample(x, y).iter().for_each(|c| statistics.add(0, c, 2.0 * p));
             for (x2, y2, p2) in all() {
@@ -307,22 +419,80 @@ mod tests {
     fn useless_samples_are_left_out_and_useful_ones_kept() {
         let decide = |light_image: f32, connections: f32| {
             let weight = MisWeight { own: 0.1, light_image, connections };
-            let mut statistics = EfficiencyEstimator::new(candidates(), 2, 0);
+            let mut statistics = EfficiencyEstimator::new(candidates(), 2, 0, LightSharing::OfIteration);
             statistics.add(0, &contribution_of(2.0, weight), 1.0);
             statistics.add(7, &contribution_of(1.0, weight), 1.0);
             statistics.add(1, &contribution_of(f32::NAN, weight), 1.0);
-            statistics.best(&[(1.0, 1.0), (1.0, 0.5)], &COSTS)
+            let region = |mean2| RegionVariance { pixels: 1.0, variance: 1.0, mean2 };
+            statistics.best(&[region(1.0), region(0.5)], &COSTS)
         };
         assert_eq!(decide(0.0, 0.0), SampleAllocation { light_image: 0.0625, connections: 0.0625 });
         assert_eq!(decide(0.0, 0.95), SampleAllocation { light_image: 0.0625, connections: 1.0 });
         assert_eq!(decide(0.9, 0.0), SampleAllocation { light_image: 1.0, connections: 0.0625 });
         // In a scene without light there is nothing to decide.
-        assert_eq!(EfficiencyEstimator::new(candidates(), 1, 0).best(&[(0.0, 0.0)], &COSTS), SampleAllocation::FULL);
+        assert_eq!(
+            EfficiencyEstimator::new(candidates(), 1, 0, LightSharing::OfIteration)
+                .best(&[RegionVariance { pixels: 1.0, variance: 0.0, mean2: 0.0 }], &COSTS),
+            SampleAllocation::FULL
+        );
+    }
+
+    /// Samples of a region of many pixels that are the sum of a part of their own and one that all share, which is a
+    /// connection: its variance is found as a covariance, and falls with the square of the share of connections.
+    #[test]
+    fn the_covariance_of_pixels_is_found() {
+        const PIXELS: usize = 64;
+        const REGIONS: usize = 4000;
+        let mut rng = HashRng::new(5, 6, 7, 8);
+        let mut estimator = EfficiencyEstimator::new(candidates(), REGIONS, PIXELS, LightSharing::OfIteration);
+        let eye = MisWeight { own: 1.0, light_image: 0.0, connections: 0.0 };
+        let connected = MisWeight { own: 0.5, light_image: 0.0, connections: 0.5 };
+        for region in 0..REGIONS {
+            for second in [false, true] {
+                let shared = rng.next_f32();
+                for pixel in 0..PIXELS {
+                    let own = contribution_of(rng.next_f32(), eye);
+                    let shared = WeightedContribution { connection: true, ..contribution_of(shared, connected) };
+                    estimator.add_sample(Probe { region, pixel, second }, &[own, shared], 1.0);
+                }
+            }
+        }
+        for (number, allocation) in candidates().iter().enumerate() {
+            let each = estimator.differences.iter().skip(number).step_by(candidates().len());
+            let mean = each.map(|d| d.covariance(PIXELS as u32)).sum::<f64>() / REGIONS as f64;
+            let p = f64::from(allocation.connections);
+            let expected = (p / (1.0 - 0.5 * (1.0 - p))).powi(2) / 12.0;
+            assert!((mean / expected - 1.0).abs() < 0.1, "{allocation:?}: {mean} {expected}");
+            // Twice for two samples, half for the mean of pixels and regions.
+            let all: f64 = (0..REGIONS).map(|r| estimator.shared_error(r, number, PIXELS as f64)).sum();
+            let expected = expected * (PIXELS * (PIXELS - 1)) as f64;
+            assert!((all / REGIONS as f64 / expected - 1.0).abs() < 0.1, "{allocation:?}: {all}");
+        }
+    }
+
+    /// Connections that cost little and are shared by all pixels of a region are kept where pixels count alone, and
+    /// left to other techniques where regions count too.
+    #[test]
+    fn light_sub_paths_of_several_pixels_count_as_shared() {
+        let decide = |sharing: LightSharing| {
+            let mut statistics = EfficiencyEstimator::new(candidates(), 1, 2, sharing);
+            let weight = MisWeight { own: 1.0, light_image: 0.0, connections: 1.0 };
+            for (pixel, values) in [[0.0, 2.0], [2.0, 0.0]].into_iter().enumerate() {
+                for (second, value) in [(false, values[0]), (true, values[1])] {
+                    let c = WeightedContribution { connection: true, ..contribution_of(value, weight) };
+                    statistics.add(0, &c, 1.0);
+                    statistics.add_sample(Probe { region: 0, pixel, second }, &[c], 1.0);
+                }
+            }
+            statistics.best(&[RegionVariance { pixels: 2.0, variance: 8.0, mean2: 1.0 }], &COSTS).light_image
+        };
+        assert_eq!(decide(LightSharing::OfPixels), 1.0);
+        assert_eq!(decide(LightSharing::OfIteration), 0.0625);
     }
 
     #[test]
     fn a_state_of_another_render_does_not_fit() {
-        let one = EfficiencyEstimator::new(candidates(), 2, 3);
+        let one = EfficiencyEstimator::new(candidates(), 2, 3, LightSharing::OfIteration);
         assert!(one.fits(&candidates(), 2));
         assert!(!one.fits(&candidates(), 3) && !one.fits(&candidates()[1..], 2));
     }

@@ -86,7 +86,8 @@ fn parameters_do_not_change_the_expectation() {
             &importance::IC_BDPT,
             &[("distributions", "visible"), ("selection", "per-length"), ("connections_per_vertex", "1")],
         ),
-        (&importance::IC_BDPT, &[("distributions", "unoccluded")]),
+        // With fewer connections one pixel hangs on rare samples: it agrees at 2048 spp, but its error is not known at 32.
+        (&importance::IC_BDPT, &[("distributions", "unoccluded"), ("allocation", "full")]),
         (&importance::IC_BDPT, &[("presampled_paths", "50"), ("nearest_records", "1")]),
         (&importance::IC_BDPT, &[("nearest_records", "0"), ("connections_per_vertex", "2")]),
         (

@@ -11,7 +11,7 @@ use super::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIR
 use super::{Integrator, IntegratorSpec, Params, bidirectional};
 use crate::bidir::allocation::combinations;
 use crate::bidir::{AllocationOptimizer, BidirSettings, Bidirectional, RayCosts};
-use crate::mis::{Heuristic, SampleAllocation};
+use crate::mis::{Heuristic, LightSharing, SampleAllocation};
 use own_subpath::OwnSubpath;
 
 /// The registry's line.
@@ -47,7 +47,11 @@ fn build(params: &Params) -> Box<dyn Integrator> {
     match (&candidates[..], heuristic) {
         // The variance at other numbers of samples is known for the balance heuristic only.
         (&[only], _) | (&[only, ..], Heuristic::Power) => Box::new(this.with_allocation(only)),
-        _ => Box::new(this.with_optimizer(Some(AllocationOptimizer::new(candidates, RayCosts::OWN_SUBPATH)))),
+        _ => Box::new(this.with_optimizer(Some(AllocationOptimizer::new(
+            candidates,
+            RayCosts::OWN_SUBPATH,
+            LightSharing::OfPixels,
+        )))),
     }
 }
 

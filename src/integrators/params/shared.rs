@@ -101,8 +101,8 @@ pub const ALLOCATION: ParamSpec = ParamSpec {
             Choice {
                 name: "auto",
                 aliases: &[],
-                meaning: "after two iterations at full numbers, the allocation with the smallest product of variance \
-                    and cost, as these two iterations estimate it",
+                meaning: "after two iterations at full numbers, the allocation with the smallest product of cost and \
+                    error, of pixels and of 16x16 blocks alike, as these two iterations estimate it",
             },
             Choice { name: "full", aliases: &["never"], meaning: "full numbers in every iteration, as published" },
         ],
