@@ -135,7 +135,9 @@ fn the_estimated_error_of_blocks_is_the_true_one() {
         let params = Params::with(spec, &[("max_depth", "5")]).unwrap();
         let film = |seed: u64| {
             let mut estimator = Estimator::new((spec.build)(&params), scene.window, seed);
-            (0..16).for_each(|_| drop(estimator.iterate(&scene)));
+            for _ in 0..16 {
+                estimator.iterate(&scene);
+            }
             estimator.film
         };
         let (mut estimates, mut truth) = (0.0, 0.0);

@@ -7,7 +7,7 @@
 //!
 //! DEVIATION: Nabata et al. 2020, "Two-stage resampling", §6 takes M₁ = 10,000 for all scenes.
 
-/// √(B/A), measured: 64 in a room behind a door, 64, 48 and 81 in three public scenes (two of M, 8 and 16 iterations).
+/// √(B/A), measured from two numbers M: 68 in a room behind a door, 64, 81 and 48 in three public scenes.
 const VARIANCE_RATIO_SQRT: f64 = 64.0;
 /// Cost of a ray of an eye sub-path with the work that belongs to it, in rays of light sub-paths.
 pub(super) const EYE_COST: f64 = 3.5;
