@@ -66,7 +66,7 @@ pub struct PictureErrors {
 }
 
 /// Keeps MAPE and relMSE finite where the reference is black.
-const FLOOR: f64 = 0.01;
+pub(super) const FLOOR: f64 = 0.01;
 
 /// One pixel in this many is left out of the trimmed relMSE.
 const TRIM: usize = 1000;
@@ -123,7 +123,7 @@ pub fn colours(image: &Image, reference: &Image) -> Result<(Colours, Colours, us
     Ok((all(image), all(reference), image.width as usize))
 }
 
-fn is_finite(pixel: &[f64; 3]) -> bool {
+pub(super) fn is_finite(pixel: &[f64; 3]) -> bool {
     pixel.iter().all(|v| v.is_finite())
 }
 

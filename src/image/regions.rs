@@ -1,11 +1,14 @@
 //! Errors of regions: what all pixels of a block are wrong by together.
 //!
-//! A measure that looks at each pixel alone cannot tell grain from blotches. With independent pixels the relMSE of means of blocks of n
-//! pixels is about 1/n of the pixels' own; light sub-paths that pixels share make it larger, up to as large.
+//! A measure that looks at each pixel alone cannot tell grain from blotches. With independent pixels the relMSE of
+//! means of blocks of n pixels is about 1/n of the pixels' own; light sub-paths that pixels share make it larger, up to
+//! as large.
 
+use super::metrics::{FLOOR, is_finite};
 use serde::Serialize;
 
-/// Errors of means of regions: mean of d² / (r² + 0.01), where d is the difference of a region's means in a channel and r the reference's.
+/// Errors of means of regions: mean of d² / (r² + 0.01), where d is the difference of a region's means in a channel and
+/// r the reference's.
 ///
 /// Blocks at the right and lower borders can be smaller; blocks count by their pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -19,9 +22,6 @@ pub struct RegionErrors {
     /// The whole picture.
     pub relmse_whole: f64,
 }
-
-/// Keeps the errors finite where the reference is black.
-const FLOOR: f64 = 0.01;
 
 /// The sums of a block's pixels in both pictures, and their number.
 #[derive(Clone, Copy, Default)]
@@ -40,7 +40,7 @@ impl Block {
         self.pixels += other.pixels;
     }
 
-    /// Its squared relative error times its pixels and channels.
+    /// Squared relative error of the block's means, times its pixels and channels.
     fn weighted_error(&self) -> f64 {
         if self.pixels == 0.0 {
             return 0.0;
@@ -78,15 +78,14 @@ impl Blocks {
     }
 }
 
-/// Errors of the regions of a picture whose rows have `width` pixels. Pixels that are not finite in either picture are left out; without any
-/// finite pixel the errors are NaN.
+/// Errors of the regions of a picture whose rows have `width` pixels. Pixels that are not finite in either picture are
+/// left out; without any finite pixel the errors are NaN.
 ///
 /// # Panics
 /// If the pictures do not have equally many pixels.
 pub fn region_errors(image: &[[f64; 3]], reference: &[[f64; 3]], width: usize) -> RegionErrors {
     assert_eq!(image.len(), reference.len());
-    let finite = |p: &[f64; 3]| p.iter().all(|v| v.is_finite());
-    let pixel = |(image, reference): (&[f64; 3], &[f64; 3])| match finite(image) && finite(reference) {
+    let pixel = |(image, reference): (&[f64; 3], &[f64; 3])| match is_finite(image) && is_finite(reference) {
         true => Block { image: *image, reference: *reference, pixels: 1.0 },
         false => Block::default(),
     };

@@ -33,7 +33,7 @@ pub struct Row {
     pub calibration: f64,
     /// Samples per pixel, and the error of each seed there.
     pub errors: Vec<(u64, Vec<f64>)>,
-    /// The same of 16 × 16 blocks; earlier measurements have none.
+    /// Samples per pixel, and the relMSE of means of 16 × 16 blocks of each seed there; absent in earlier measurements.
     #[serde(default)]
     pub block_errors: Vec<(u64, Vec<f64>)>,
     /// Samples that were not finite.

@@ -15,9 +15,9 @@ use std::sync::Arc;
 /// Where a scene is, and how large.
 #[derive(Clone, Copy)]
 pub(super) struct Extent {
-    /// In the coordinates of the file.
+    /// Centre in the coordinates of the file.
     pub centre: DVec3,
-    /// Of a sphere around the centre that holds all surfaces.
+    /// Radius of a sphere around the centre that holds all surfaces.
     pub radius: f32,
 }
 

@@ -14,7 +14,7 @@ pub(super) struct PlacedScene {
     pub geometry: Geometry,
     /// Data of each mesh of `geometry` for shading.
     pub meshes: Vec<MeshShading>,
-    /// What each mesh of `geometry` emits.
+    /// Emission of each mesh of `geometry`.
     pub emission: Vec<Option<AreaEmission>>,
     /// Inverse transposes of the instances' maps.
     pub instance_normals: Vec<Mat3A>,

@@ -3,6 +3,9 @@
 use crate::math::Vec3;
 use rayon::prelude::*;
 
+/// Bits of a code.
+pub const BITS: u32 = 30;
+
 /// Moves the lower ten bits of `x` three apart.
 fn dilate(x: u32) -> u32 {
     let x = (x | x << 16) & 0x0300_00ff;
@@ -11,7 +14,7 @@ fn dilate(x: u32) -> u32 {
     (x | x << 2) & 0x0924_9249
 }
 
-/// Morton code of `p` in the box from `lo` to `hi`, 30 bits; points outside are moved to its faces.
+/// Morton code of `p` in the box from `lo` to `hi`, of [`BITS`] bits; points outside are moved to its faces.
 pub fn code(p: Vec3, lo: Vec3, hi: Vec3) -> u32 {
     let size = (hi - lo).max(Vec3::splat(f32::MIN_POSITIVE));
     let cell = ((p - lo) / size * 1024.0).clamp(Vec3::ZERO, Vec3::splat(1023.0));

@@ -118,8 +118,8 @@ struct Silent;
 
 impl Observer for Silent {}
 
-/// A picture of this size has few blocks: the estimate is the true error on the average over seeds, with independent pixels and with light
-/// sub-paths that all pixels share.
+/// A picture of this size has few blocks: the estimate is the true error on the average over seeds, with independent
+/// pixels and with light sub-paths that all pixels share.
 #[test]
 fn the_estimated_error_of_blocks_is_the_true_one() {
     const PAIRS: u64 = 24;

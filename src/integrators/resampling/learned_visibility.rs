@@ -1,14 +1,16 @@
-//! What groups of cache points saw of the light vertices of earlier iterations.
+//! Visibility of light vertices from groups of cache points, learned over iterations, for the cut of the first stage.
 //!
-//! Space is divided into the cells of an octree. For every group and every cell it is counted how many pairs of a cache point and a light
-//! vertex in the cell saw each other. The cut of the first stage then splits clusters where visible light is, and leaves those together
-//! that a wall hides. This decides how the vertices of an iteration are divided, from earlier iterations alone: every division is unbiased.
+//! Space is divided into the cells of an octree. For every group and every cell, pairs of a cache point and a light
+//! vertex in the cell are counted, and visible pairs: light of the vertex reaches the cache point. The cut of the first
+//! stage then splits clusters where visible light is, and leaves those together that a wall hides. Only the division of
+//! an iteration's vertices depends on these counts, which are of earlier iterations: every division is unbiased.
 //!
-//! The share of a cell is a mean of its own pairs and, counted for [`PRIOR`] pairs, the share of the cell around it; that of all space is one
-//! before anything is known.
+//! The visible share of a cell is a mean of its own pairs and, counted for [`PRIOR`] pairs, the share of the cell
+//! around it; the share of all space is one before anything is known.
 
 use crate::math::Vec3;
 use crate::spatial::light_tree::Aabb;
+use crate::spatial::morton;
 use serde::{Deserialize, Serialize};
 
 /// Levels of the octree below its root.
@@ -23,66 +25,55 @@ const fn cells(level: u32) -> usize {
     ((1 << (3 * (level + 1))) - 1) / 7
 }
 
-/// The octree: cubes within cubes.
+/// The octree, a cube within which cells are told apart by Morton codes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Octree {
-    /// Corner of the largest cube.
-    min: Vec3,
-    /// Smallest cubes per unit of length.
-    scale: f32,
+    /// Half of the length of the cube's sides; the origin is its centre.
+    radius: f32,
 }
 
 /// A cell of the octree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
-    /// 0 for the largest.
+    /// Level, 0 for the cube of the whole scene.
     level: u32,
-    /// Its place among the 2^level along each axis.
-    xyz: [u32; 3],
+    /// Morton code among the 8^level cells of the level.
+    code: u32,
 }
 
 impl Cell {
-    /// Its number among the cells of all levels.
+    /// Number of the cell among the cells of all levels.
     #[inline]
     fn number(self) -> usize {
-        let first = self.level.checked_sub(1).map_or(0, cells);
-        let [x, y, z] = self.xyz;
-        first + ((x << self.level | y) << self.level | z) as usize
+        self.level.checked_sub(1).map_or(0, cells) + self.code as usize
     }
 
-    /// It and the cells around it, ever larger.
+    /// The cell itself and the cells around it, ever larger.
     #[inline]
     fn ancestry(self) -> impl Iterator<Item = Cell> {
-        (0..=self.level).map(move |up| Cell { level: self.level - up, xyz: self.xyz.map(|i| i >> up) })
+        (0..=self.level).map(move |up| Cell { level: self.level - up, code: self.code >> (3 * up) })
     }
 }
 
 impl Octree {
     /// Around the ball of this radius around the origin.
     pub fn new(radius: f32) -> Octree {
-        let radius = radius.max(f32::MIN_POSITIVE);
-        Octree { min: Vec3::splat(-radius), scale: 0.5 * (1u32 << LEVELS) as f32 / radius }
-    }
-
-    #[inline]
-    fn smallest(&self, p: Vec3) -> [u32; 3] {
-        // Coordinates that are not numbers become 0.
-        ((p - self.min) * self.scale).to_array().map(|i| (i as u32).min((1 << LEVELS) - 1))
+        Octree { radius }
     }
 
     /// The smallest cell that holds a point; points outside belong to the nearest cells.
     #[inline]
     pub fn cell(&self, p: Vec3) -> Cell {
-        Cell { level: LEVELS, xyz: self.smallest(p) }
+        let code = morton::code(p, Vec3::splat(-self.radius), Vec3::splat(self.radius));
+        Cell { level: LEVELS, code: code >> (morton::BITS - 3 * LEVELS) }
     }
 
     /// The smallest cell that holds a box.
     #[inline]
     pub fn cell_around(&self, aabb: &Aabb) -> Cell {
-        let (min, max) = (self.smallest(aabb.min), self.smallest(aabb.max));
-        let differ = (min[0] ^ max[0]) | (min[1] ^ max[1]) | (min[2] ^ max[2]);
-        let up = u32::BITS - differ.leading_zeros();
-        Cell { level: LEVELS - up, xyz: min.map(|i| i >> up) }
+        let (min, max) = (self.cell(aabb.min).code, self.cell(aabb.max).code);
+        let up = (u32::BITS - (min ^ max).leading_zeros()).div_ceil(3);
+        Cell { level: LEVELS - up, code: min >> (3 * up) }
     }
 }
 
@@ -90,7 +81,7 @@ impl Octree {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Pairs {
     all: u32,
-    /// Those that saw each other.
+    /// Visible pairs.
     seen: u32,
 }
 
@@ -102,7 +93,7 @@ pub(super) struct SeenCells {
 }
 
 impl SeenCells {
-    /// Adds pairs with a light vertex in `cell`, of which so many saw each other.
+    /// Adds `all` pairs with a light vertex in `cell`, of which `seen` are visible.
     pub fn add(&mut self, cell: Cell, all: u32, seen: u32) {
         self.pairs.resize(cells(LEVELS), Pairs::default());
         for cell in cell.ancestry() {
@@ -114,7 +105,7 @@ impl SeenCells {
         }
     }
 
-    /// Estimated share of the pairs with light vertices in `cell` that see each other.
+    /// Estimated visible share of the pairs with light vertices in `cell`.
     #[inline]
     fn share(&self, cell: Cell) -> f32 {
         if self.pairs.is_empty() {
@@ -134,7 +125,7 @@ impl SeenCells {
         UNSEEN + (1.0 - UNSEEN) * self.share(cell)
     }
 
-    /// It is empty or has all cells: a saved state may be of something else.
+    /// The counts are of all cells, or there are none yet: a saved state may be of something else.
     pub fn is_whole(&self) -> bool {
         [0, cells(LEVELS)].contains(&self.pairs.len()) && self.pairs.iter().all(|p| p.seen <= p.all)
     }
@@ -151,12 +142,7 @@ mod tests {
     fn cells_have_numbers_of_their_own() {
         let mut numbers = std::collections::BTreeSet::new();
         for level in 0..=LEVELS {
-            let side = 0..1 << level;
-            for x in side.clone() {
-                for y in side.clone() {
-                    side.clone().for_each(|z| assert!(numbers.insert(Cell { level, xyz: [x, y, z] }.number())));
-                }
-            }
+            (0..1 << (3 * level)).for_each(|code| assert!(numbers.insert(Cell { level, code }.number())));
         }
         assert!(numbers.into_iter().eq(0..cells(LEVELS)));
     }
@@ -175,8 +161,8 @@ mod tests {
             let [p, q] = [a, a + b].map(|p| OCTREE().cell(p).ancestry().collect::<Vec<_>>());
             assert_eq!(p.iter().find(|cell| q.contains(cell)), Some(&holding));
         }
-        assert_eq!(OCTREE().cell(Vec3::splat(f32::NAN)).xyz, [0; 3]);
-        assert_eq!(OCTREE().cell(Vec3::splat(9.0)).xyz, [(1 << LEVELS) - 1; 3]);
+        assert_eq!(OCTREE().cell(Vec3::splat(f32::NAN)).code, 0);
+        assert_eq!(OCTREE().cell(Vec3::splat(9.0)).code, (1 << (3 * LEVELS)) - 1);
     }
 
     #[test]
@@ -193,7 +179,7 @@ mod tests {
         // Nothing is known of b, but of the cells around it.
         assert!((seen.share(b) - 0.75).abs() < 2e-2, "{}", seen.share(b));
         assert!((seen.importance(octree.cell(Vec3::splat(1.9))) - UNSEEN).abs() < 1e-3);
-        let root = Cell { level: 0, xyz: [0; 3] };
+        let root = Cell { level: 0, code: 0 };
         assert!((seen.share(root) - 0.375).abs() < 1e-3);
         assert!(seen.is_whole());
     }

@@ -9,6 +9,7 @@
 //! in earlier iterations (`learned_visibility`).
 //!
 //! DEVIATION: the first stage there ignores visibility. Of the M₂ candidates behind a door few are seen through it.
+//! Weights still take q₁ of eq. 17 there without visibility.
 //!
 //! Every cache point then has a pmf P₂(j) of its entries, proportional to q̂₂/(p P₁): the light that the entry brings
 //! to the cache point, visibility included, times the number of vertices that the entry represents.
@@ -55,7 +56,7 @@ pub(super) struct GroupPmf {
     /// For each cache point, the light that it found.
     found: Vec<FoundLight>,
     ranges: Vec<Range<usize>>,
-    /// What the group has seen in earlier iterations.
+    /// Visibility of light vertices by cell, from earlier iterations.
     seen_cells: SeenCells,
 }
 
@@ -65,7 +66,7 @@ struct FirstStage<'a> {
     store: &'a VertexStore,
     /// M₂.
     clusters: usize,
-    /// Cells by which groups remember what they saw, if cuts go by it.
+    /// Cells of learned visibility, if the cut goes by it.
     octree: Option<&'a Octree>,
 }
 
@@ -92,7 +93,7 @@ pub(super) struct Selection {
 #[derive(Debug, Default)]
 pub(super) struct Pmfs {
     groups: Vec<GroupPmf>,
-    /// Cells by which groups remember what they saw, if cuts go by it.
+    /// Cells of learned visibility, if cuts go by it.
     octree: Option<Octree>,
     /// For each cache point its group.
     group_of: Vec<u32>,
@@ -246,12 +247,12 @@ impl Pmfs {
         })
     }
 
-    /// Cuts of the first stage go by what groups saw in earlier iterations, of a scene of this radius.
+    /// Cuts of the first stage go by learned visibility, in a scene of this radius.
     pub fn learn_visibility(&mut self, radius: f32) {
         self.octree = Some(Octree::new(radius));
     }
 
-    /// Remembers what the groups saw of the vertices of `store`, whose pmfs were found last.
+    /// Adds the visibility of the entries of `store`, whose pmfs were found last, to the counts of all groups.
     pub fn learn(&mut self, caches: &CachePoints, store: &VertexStore) {
         let Some(octree) = &self.octree else { return };
         self.groups.par_iter_mut().zip(&caches.groups).for_each(|(group, range)| {
@@ -262,12 +263,12 @@ impl Pmfs {
         });
     }
 
-    /// What each group saw so far.
+    /// Visibility of light vertices by cell, for each group.
     pub fn seen_cells(&self) -> impl Iterator<Item = &SeenCells> {
         self.groups.iter().map(|group| &group.seen_cells)
     }
 
-    /// Goes on from what groups saw in an earlier run; false if it is of other groups.
+    /// Goes on from the counts of an earlier run; false if they are of other groups.
     pub fn restore(&mut self, seen: Vec<SeenCells>) -> bool {
         let fits = seen.len() == self.groups.len() && seen.iter().all(SeenCells::is_whole);
         if fits {

@@ -27,7 +27,7 @@ pub(super) struct ResamplingSettings {
     pub radiance: bool,
     /// Each cache point is a technique of its own.
     pub per_cache: bool,
-    /// Cuts of the first stage go by what cache points saw in earlier iterations.
+    /// Cuts of the first of two stages go by visibility learned in earlier iterations.
     pub learned_visibility: bool,
     /// Weights know of the second stage; otherwise they take M₂ for the number of candidates.
     pub two_stage_weights: bool,

@@ -82,7 +82,7 @@ struct SavedCaches {
     sums: Vec<FoundLight>,
     iterations: u64,
     counted: VertexCount,
-    /// For each group of cache points.
+    /// Learned visibility, for each group of cache points.
     seen: Vec<SeenCells>,
 }
 
@@ -202,7 +202,7 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
         let eye_rays = stats.rays(&[RayKind::Cache]) / (pixels * self.settings.cache_fraction).max(1.0);
         let paths = if self.settings.paths > 0 { self.settings.paths } else { pixels as u32 }.min(WarmUp::MAX_PATHS);
         let second_stage = self.settings.second_stage.map(|m2| m2 as usize);
-        if second_stage.is_some() && self.settings.learned_visibility {
+        if self.settings.learned_visibility {
             self.caches.pmfs.learn_visibility(warm_up.iteration.scene.radius);
         }
         let mut light_rays = 0.0;

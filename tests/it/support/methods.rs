@@ -33,7 +33,7 @@ pub fn for_small_scenes(spec: &IntegratorSpec, variant: usize) -> Vec<(&'static 
     declared(spec, &all).collect()
 }
 
-/// Those of some values whose parameters a method has.
+/// The values whose parameters a method has.
 pub fn declared<'a, 's>(
     spec: &'s IntegratorSpec,
     values: &'s [(&'a str, &'a str)],
