@@ -13,9 +13,9 @@ use super::records::ImportanceRecords;
 use crate::bidir::VertexStore;
 use crate::math::Vec3;
 use crate::math::cdf::CdfRows;
-use crate::path::Iteration;
+use crate::path::{Iteration, ShadowQueue};
 use crate::ray::offset::segment;
-use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
+use crate::ray::{PACKET, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -206,20 +206,29 @@ struct Source<'a> {
 }
 
 impl Weights {
-    /// Finds the weights of all vertices at all records of a group, by packets of shadow rays from all records to one
-    /// vertex.
+    /// Finds the weights of all vertices at all records of a group, by packets of shadow rays from the records to one
+    /// vertex after the other.
     fn find(&mut self, source: &Source, tracer: &mut Tracer) {
         let (records, vertices) = (source.group.len(), source.vertices.len());
         for list in [&mut self.seen, &mut self.open, &mut self.bounded] {
             list.clear();
             list.resize(records * vertices, 0.0);
         }
+        let mut queue = ShadowQueue::new(RayKind::ShadowPmf);
         for v in 0..vertices {
-            self.find_vertex(source, v, tracer);
+            self.find_vertex(source, v, tracer, &mut queue);
         }
+        queue.flush(tracer, |(at, light): (usize, f32), _| self.seen[at] = light);
     }
 
-    fn find_vertex(&mut self, source: &Source, v: usize, tracer: &mut Tracer) {
+    /// Finds the weights of one vertex; those that count visibility arrive by `queue`, which has their places.
+    fn find_vertex(
+        &mut self,
+        source: &Source,
+        v: usize,
+        tracer: &mut Tracer,
+        queue: &mut ShadowQueue<(usize, f32)>,
+    ) {
         let &Source { records, group, store, vertices, scheme } = source;
         let number = vertices[v] as usize;
         let wants = |distribution| scheme.only.is_none_or(|only| only == distribution);
@@ -227,8 +236,6 @@ impl Weights {
         let y = store.vertex(number);
         let (bsdf, end) = (store.bsdf(number), y.place.segment_end());
         let value = |to: Vec3| bsdf.eval(y.wo, to, Transport::Importance);
-        let mut packet = SegmentPacket::default();
-        let mut light = [(0, 0.0); PACKET];
         for record in 0..group.len() {
             let at = record * vertices.len() + v;
             if bounded {
@@ -243,17 +250,8 @@ impl Weights {
                 self.open[at] = open;
             }
             if wants(Distribution::Visible) {
-                light[packet.len] = (at, open);
-                packet.push(&segment(&records.ends[group.start + record], &end));
-            }
-        }
-        if packet.len == 0 {
-            return;
-        }
-        let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
-        for (i, &(at, open)) in light[..packet.len].iter().enumerate() {
-            if blocked >> i & 1 == 0 {
-                self.seen[at] = open;
+                let (segment, seen) = (segment(&records.ends[group.start + record], &end), &mut self.seen);
+                queue.push(&segment, (at, open), tracer, |(at, light), _| seen[at] = light);
             }
         }
     }

@@ -1,9 +1,8 @@
 //! Cache points: surface points at which the pmfs of light vertices are found for the eye vertices around.
 //!
 //! They are the vertices of a few eye sub-paths (a fixed fraction of the number of pixels), traced once. Those that are
-//! near each other and face the same way form groups of up to sixteen, which share packets of shadow rays and, where
-//! there are two stages, the candidates of the second. Each keeps running means of the light found at it: its
-//! normalisations Q.
+//! near each other and face the same way form groups of up to sixteen, which share, where there are two stages, the
+//! candidates of the second. Each keeps running means of the light found at it: its normalisations Q.
 
 use super::settings::ResamplingSettings;
 use crate::bidir::WarmUp;
@@ -14,7 +13,7 @@ use crate::mis::ResamplingTarget;
 use crate::mis::factors::NormalizationEstimate;
 use crate::path::StoredPlace;
 use crate::ray::offset::SegmentEnd;
-use crate::ray::{PACKET, RayStats};
+use crate::ray::RayStats;
 use crate::shade::{BsdfPool, StoredBsdf, Transport};
 use crate::spatial::NearestPoints;
 use crate::spatial::light_tree::ReceiverBounds;
@@ -69,28 +68,28 @@ struct CacheBsdfs {
     pool: BsdfPool,
 }
 
-/// Cuts a range of points in two along the longest side of the box around them, at a multiple of the size of a packet,
+/// Cuts a range of points in two along the longest side of the box around them, at a multiple of the size of a group,
 /// until it fits into one.
-fn group(points: &mut [EyeSubpathVertex], first: usize, groups: &mut Vec<Range<usize>>) {
-    if points.len() <= PACKET {
+fn group(points: &mut [EyeSubpathVertex], size: usize, first: usize, groups: &mut Vec<Range<usize>>) {
+    if points.len() <= size {
         groups.push(first..first + points.len());
         return;
     }
     let lo = points.iter().fold(Vec3::INFINITY, |lo, c| lo.min(c.p));
     let hi = points.iter().fold(Vec3::NEG_INFINITY, |hi, c| hi.max(c.p));
-    let size = hi - lo;
-    let axis = if size.x >= size.y && size.x >= size.z {
+    let sides = hi - lo;
+    let axis = if sides.x >= sides.y && sides.x >= sides.z {
         0
-    } else if size.y >= size.z {
+    } else if sides.y >= sides.z {
         1
     } else {
         2
     };
-    let middle = points.len().div_ceil(2).next_multiple_of(PACKET).min(points.len() - 1);
+    let middle = points.len().div_ceil(2).next_multiple_of(size).min(points.len() - 1);
     points.select_nth_unstable_by(middle, |a, b| a.p[axis].total_cmp(&b.p[axis]));
     let (left, right) = points.split_at_mut(middle);
-    group(left, first, groups);
-    group(right, first + middle, groups);
+    group(left, size, first, groups);
+    group(right, size, first + middle, groups);
 }
 
 /// For each point, the three others of its group that are nearest.
@@ -135,7 +134,7 @@ impl CachePoints {
         while first < all.len() {
             let own = metric.kind(all[first].side);
             let count = all[first..].iter().take_while(|c| metric.kind(c.side) == own).count();
-            group(&mut all[first..first + count], first, &mut groups);
+            group(&mut all[first..first + count], settings.group_size, first, &mut groups);
             first += count;
         }
         let (points, sides) = (all.iter().map(|c| c.p).collect(), all.iter().map(|c| c.side).collect());
@@ -289,14 +288,14 @@ mod tests {
             })
             .collect();
         let mut groups = vec![];
-        group(&mut points, 0, &mut groups);
+        group(&mut points, 16, 0, &mut groups);
         assert!(groups.iter().map(ExactSizeIterator::len).eq(std::iter::repeat_n(16, 62).chain([8])));
         assert!(groups.windows(2).all(|w| w[0].end == w[1].start) && groups[0].start == 0);
         for g in &groups {
             let centre = points[g.clone()].iter().map(|c| c.p).sum::<Vec3>() / g.len() as f32;
             assert!(points[g.clone()].iter().all(|c| c.p.distance(centre) < 0.4));
         }
-        group(&mut [], 3, &mut groups);
+        group(&mut [], 16, 3, &mut groups);
         assert_eq!(groups.pop(), Some(3..3));
     }
 }

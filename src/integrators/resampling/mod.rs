@@ -26,7 +26,7 @@ use super::{Integrator, ParamSpec, Params, bidirectional};
 use crate::bidir::Bidirectional;
 use crate::mis::factors::{Balance, PerCacheFactor, RisFactor};
 use crate::spatial::nearest::Metric;
-use settings::ResamplingSettings;
+use settings::{MAX_GROUP, ResamplingSettings};
 use strategy::CacheStrategy;
 
 /// Parameters of methods with one stage, up to the weights; the latter differ in their default.
@@ -87,6 +87,7 @@ fn build(params: &Params, paths: u32, second_stage: Option<u32>) -> Box<dyn Inte
         samples: params.int("connections_per_vertex") as u32,
         neighbors: params.int("nearest_caches") as usize,
         cache_fraction: params.float("cache_density"),
+        group_size: second_stage.map_or(MAX_GROUP, |_| params.int("group_size") as usize),
         epsilon: params.float("min_density_ratio") as f32,
         min_unseen_fraction: params.float("min_unseen_fraction") as f32,
         trusted: params.is("unseen_model", "constant"),

@@ -4,6 +4,7 @@
 //! multiple light sub-paths"; as *two-stage*: Nabata et al. 2020, "Two-stage resampling for bidirectional path tracing
 //! with multiple light sub-paths".
 
+use super::settings::MAX_GROUP;
 use crate::integrators::params::presampled::PRESAMPLED_PATHS;
 use crate::integrators::params::{AliasValues, Choice, ParamAlias, ParamDefault, ParamSpec};
 
@@ -65,6 +66,16 @@ pub(super) const GROUPED_CACHE_DENSITY: ParamSpec = ParamSpec {
         cache points are closer to each eye vertex and cost more shadow rays. Published: 0.4% (Nabata et al. 2020, \
         two-stage resampling, section 6).",
     ..CACHE_DENSITY
+};
+
+/// Cache points of a group.
+pub(super) const GROUP_SIZE: ParamSpec = ParamSpec {
+    name: "group_size",
+    aliases: &[],
+    default: ParamDefault::Int { default: 8, min: 1, max: MAX_GROUP as i64 },
+    unit: "points",
+    short: "Neighbouring cache points that share the candidates of the second stage",
+    long: "The first stage draws its candidates once for a group of cache points. An eye vertex uses cache points of         one group only. Smaller groups make errors of whole regions smaller, as fewer pixels share candidates; larger         ones make pixels less noisy. Published: 1, a new choice of candidates for every cache point (Nabata et al. 2020,         two-stage resampling, section 5).",
 };
 
 /// Distance by which cache points are nearest.

@@ -17,16 +17,16 @@
 //! DEVIATION: eq. 15 there divides by M₂, which is right for M₂ independent draws from one P₁. One drawn per cluster,
 //! the entries sum up to the whole by themselves: there is no 1/M₂, and P₂ has the factor S_j, which eq. 16 leaves out.
 //!
-//! Shadow rays go out in packets, from all points of a group to one light vertex.
+//! Shadow rays go out in packets, from the points of a group to one light vertex after the other.
 
 use super::cache_points::{CachePoints, FoundLight};
 use super::learned_visibility::{Octree, SeenCells};
 use crate::bidir::VertexStore;
 use crate::math::cdf::CdfRows;
 use crate::math::hash::HashRng;
-use crate::path::{Iteration, streams};
+use crate::path::{Iteration, ShadowQueue, streams};
 use crate::ray::offset::segment;
-use crate::ray::{PACKET, RayKind, RayStats, SegmentPacket, Tracer};
+use crate::ray::{RayKind, RayStats, Tracer};
 use crate::spatial::light_tree::{Aabb, CutLimits, CutScratch, ReceiverBounds};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -60,6 +60,26 @@ pub(super) struct GroupPmf {
     seen_cells: SeenCells,
 }
 
+/// Light of an entry that arrives at a cache point if nothing is between.
+#[derive(Clone, Copy, Debug, Default)]
+struct UnshadowedLight {
+    entry: u32,
+    /// Place of the cache point in its group.
+    cache: u32,
+    /// q̂₂/(p P₁).
+    full: f32,
+}
+
+impl UnshadowedLight {
+    /// Adds it to the light by cache point and entry, and to the cache points that see the entry.
+    #[inline]
+    fn add_to(self, light: &mut [f32], seen: &mut [u16]) {
+        let UnshadowedLight { entry, cache, full } = self;
+        light[cache as usize * seen.len() + entry as usize] = full;
+        seen[entry as usize] |= 1 << cache;
+    }
+}
+
 /// How candidates are drawn from the light vertices of an iteration.
 #[derive(Clone, Copy)]
 struct FirstStage<'a> {
@@ -74,8 +94,8 @@ struct FirstStage<'a> {
 #[derive(Default)]
 struct Scratch {
     cut: CutScratch,
-    /// For each cache point of a group the weights of all entries.
-    weights: Vec<f32>,
+    /// For each cache point of a group the light of all entries.
+    light: Vec<f32>,
 }
 
 /// A choice among entries.
@@ -97,6 +117,12 @@ pub(super) struct Pmfs {
     octree: Option<Octree>,
     /// For each cache point its group.
     group_of: Vec<u32>,
+}
+
+/// Entry `e` of the second stage; with one stage there are no `entries`, and it is vertex `e`.
+#[inline]
+fn entry(entries: &[Entry], e: usize) -> Entry {
+    entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, inv_p1: 1.0 })
 }
 
 impl GroupPmf {
@@ -145,65 +171,74 @@ impl GroupPmf {
         group: &Range<usize>,
         store: &VertexStore,
         tracer: &mut Tracer,
-        weights: &mut Vec<f32>,
+        light: &mut Vec<f32>,
     ) {
         self.first = group.start;
         let count = self.count;
-        weights.clear();
-        weights.resize(group.len() * count, 0.0);
+        light.clear();
+        light.resize(group.len() * count, 0.0);
         self.seen.clear();
         self.seen.resize(count, 0);
         self.found.clear();
         self.found.resize(group.len(), [0.0; 3]);
-        for e in 0..count {
-            self.fill_entry(e, caches, group, store, tracer, weights);
-        }
+        self.find_light(caches, group, store, tracer, light);
         self.rows.reset(count, group.len());
-        for c in 0..group.len() {
-            self.rows.push(|e| f64::from(weights[c * count + e]));
+        for (c, light) in light.chunks_exact(count.max(1)).enumerate() {
+            self.sum_up(c, caches.leave_one_out_neighbors[group.start + c], light);
+            let entries = &self.entries;
+            self.rows.push(|e| match light[e] {
+                0.0 => 0.0,
+                full => {
+                    let y = store.vertex(entry(entries, e).vertex as usize);
+                    f64::from(caches.pmf_weight(group.start + c, y.place.position(), full))
+                }
+            });
         }
         if count > 0 {
             self.found.iter_mut().for_each(|found| *found = found.map(|sum| sum / f64::from(store.paths_traced)));
         }
     }
 
-    /// The light that entry `e` brings to the cache points of the group, which a packet of shadow rays asks.
-    fn fill_entry(
+    /// Leaves the light of every entry, for each cache point of the group, in `light`, as far as shadow rays find it
+    /// visible; adds up the light of the first stage.
+    fn find_light(
         &mut self,
-        e: usize,
         caches: &CachePoints,
         group: &Range<usize>,
         store: &VertexStore,
         tracer: &mut Tracer,
-        weights: &mut [f32],
+        light: &mut [f32],
     ) {
         let (points, sides) = (&caches.index.points()[group.clone()], &caches.index.normals()[group.clone()]);
-        let entry = self.entries.get(e).copied().unwrap_or(Entry { vertex: e as u32, inv_p1: 1.0 });
-        let y = store.vertex(entry.vertex as usize);
-        let (bsdf, end) = (store.bsdf(entry.vertex as usize), y.place.segment_end());
-        let mut packet = SegmentPacket::default();
-        let mut light = [(0usize, 0.0f32); PACKET];
-        for c in 0..group.len() {
-            let target = y.target_over_pdf(&bsdf, points[c], sides[c]);
-            self.found[c][1] += f64::from(target.first_stage * entry.inv_p1);
-            let full = target.full * entry.inv_p1; // [two-stage eq. 16, with S_j]
-            if full > 0.0 && full.is_finite() {
-                light[packet.len] = (c, full);
-                packet.push(&segment(caches.end(group.start + c), &end));
+        let count = self.count;
+        let mut queue = ShadowQueue::<UnshadowedLight>::new(RayKind::ShadowPmf);
+        for e in 0..count {
+            let entry = entry(&self.entries, e);
+            let y = store.vertex(entry.vertex as usize);
+            let (bsdf, end) = (store.bsdf(entry.vertex as usize), y.place.segment_end());
+            for c in 0..group.len() {
+                let target = y.target_over_pdf(&bsdf, points[c], sides[c]);
+                self.found[c][1] += f64::from(target.first_stage * entry.inv_p1);
+                let full = target.full * entry.inv_p1; // [two-stage eq. 16, with S_j]
+                if full > 0.0 && full.is_finite() {
+                    let unshadowed = UnshadowedLight { entry: e as u32, cache: c as u32, full };
+                    let seen = &mut self.seen;
+                    queue.push(&segment(caches.end(group.start + c), &end), unshadowed, tracer, |arriving, _| {
+                        arriving.add_to(light, seen);
+                    });
+                }
             }
         }
-        if packet.len == 0 {
-            return;
-        }
-        let blocked = tracer.occluded_packet(&packet, RayKind::ShadowPmf);
-        let seen = light[..packet.len].iter().enumerate().filter(|(i, _)| blocked >> i & 1 == 0);
-        let seen_by = seen.clone().fold(0u16, |by, (_, (c, _))| by | 1 << c);
-        self.seen[e] = seen_by;
-        for (_, &(c, full)) in seen {
-            weights[c * self.count + e] = caches.pmf_weight(group.start + c, y.place.position(), full);
-            self.found[c][0] += f64::from(full);
-            if caches.leave_one_out_neighbors[group.start + c] & seen_by == 0 {
-                self.found[c][2] += f64::from(full);
+        queue.flush(tracer, |arriving, _| arriving.add_to(light, &mut self.seen));
+    }
+
+    /// Adds up the visible light at cache point `c` of the group, and the part of it that its neighbours miss.
+    fn sum_up(&mut self, c: usize, neighbors: u16, light: &[f32]) {
+        let [full, _, missed] = &mut self.found[c];
+        for (&light, seen_by) in light.iter().zip(&self.seen) {
+            *full += f64::from(light);
+            if neighbors & seen_by == 0 {
+                *missed += f64::from(light);
             }
         }
     }
@@ -237,7 +272,7 @@ impl Pmfs {
                     pmf.count = pmf.entries.len();
                 }
             }
-            pmf.fill(caches, group, store, &mut tracer, &mut scratch.weights);
+            pmf.fill(caches, group, store, &mut tracer, &mut scratch.light);
             tracer.stats
         };
         let groups = self.groups.par_iter_mut().zip(&caches.groups).enumerate();

@@ -2,6 +2,9 @@
 
 use crate::spatial::nearest::Metric;
 
+/// Most cache points of a group: the bits of a mask that tells which of them see a light vertex.
+pub(super) const MAX_GROUP: usize = u16::BITS as usize;
+
 /// Settings that users decide.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ResamplingSettings {
@@ -15,6 +18,8 @@ pub(super) struct ResamplingSettings {
     pub neighbors: usize,
     /// Eye sub-paths that make cache points, per pixel.
     pub cache_fraction: f64,
+    /// Cache points of a group, which share the candidates of the second stage.
+    pub group_size: usize,
     /// ε, the lower bound of p/q in weights.
     pub epsilon: f32,
     /// Lower bound of the fraction of light that weights take to be unseen by cache points.

@@ -18,6 +18,7 @@ const PARAMS: &[ParamSpec] = &[
     CONNECTIONS_PER_VERTEX,
     params::NEAREST_CACHES,
     params::GROUPED_CACHE_DENSITY,
+    params::GROUP_SIZE,
     params::METRIC,
     params::TARGET,
     params::proposal_model("mixture-with-visibility"),
