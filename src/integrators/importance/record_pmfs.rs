@@ -222,13 +222,7 @@ impl Weights {
     }
 
     /// Finds the weights of one vertex; those that count visibility arrive by `queue`, which has their places.
-    fn find_vertex(
-        &mut self,
-        source: &Source,
-        v: usize,
-        tracer: &mut Tracer,
-        queue: &mut ShadowQueue<(usize, f32)>,
-    ) {
+    fn find_vertex(&mut self, source: &Source, v: usize, tracer: &mut Tracer, queue: &mut ShadowQueue<(usize, f32)>) {
         let &Source { records, group, store, vertices, scheme } = source;
         let number = vertices[v] as usize;
         let wants = |distribution| scheme.only.is_none_or(|only| only == distribution);

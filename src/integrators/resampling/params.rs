@@ -15,7 +15,8 @@ pub(super) const FIRST_STAGE_PATHS: ParamSpec = ParamSpec {
     short: "M1: light sub-paths per iteration that the first stage resamples",
     long: "The first stage draws M2 light vertices (second_stage_paths) from those of these M1 light sub-paths for \
         each group of cache points, without shadow rays. `auto` chooses the number with the least product of \
-        variance and time, from the measured lengths of light and eye sub-paths and the number of pixels. Published: \
+        variance and time, from the measured lengths of light and eye sub-paths, the number of pixels, and how much \
+        the light of several sets of light sub-paths differs. Published: \
         10000 (Nabata et al. 2020, two-stage resampling, section 6).",
     ..PRESAMPLED_PATHS
 };
@@ -75,7 +76,10 @@ pub(super) const GROUP_SIZE: ParamSpec = ParamSpec {
     default: ParamDefault::Int { default: 8, min: 1, max: MAX_GROUP as i64 },
     unit: "points",
     short: "Neighbouring cache points that share the candidates of the second stage",
-    long: "The first stage draws its candidates once for a group of cache points. An eye vertex uses cache points of         one group only. Smaller groups make errors of whole regions smaller, as fewer pixels share candidates; larger         ones make pixels less noisy. Published: 1, a new choice of candidates for every cache point (Nabata et al. 2020,         two-stage resampling, section 5).",
+    long: "The first stage draws its candidates once for a group of cache points. An eye vertex uses cache points of \
+        one group only. Smaller groups make errors of whole regions smaller, as fewer pixels share candidates; larger \
+        ones make pixels less noisy. In the published method every cache point has candidates of its own (Nabata et \
+        al. 2020, two-stage resampling, section 5).",
 };
 
 /// Distance by which cache points are nearest.

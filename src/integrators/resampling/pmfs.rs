@@ -317,6 +317,11 @@ impl Pmfs {
         self.groups.iter().flat_map(|g| &g.found)
     }
 
+    /// For every group of cache points, the light found in this iteration, visibility included.
+    pub fn found_by_group(&self) -> impl Iterator<Item = f64> {
+        self.groups.iter().map(|g| g.found.iter().map(|[full, ..]| full).sum())
+    }
+
     /// Draws from the mixture of the probabilities at `n` cache points, all of one group if there are two stages, and
     /// an equal share of all entries; `None` if there are no entries. There is at least one cache point.
     #[inline]

@@ -22,7 +22,7 @@
 use super::cache_points::{CachePoints, FoundLight};
 use super::learned_visibility::SeenCells;
 use super::models::CacheFactor;
-use super::path_count::{EYE_COST, VERTEX_COST, best_path_count};
+use super::path_count::{EYE_COST, VERTEX_COST, best_path_count, variance_of_paths};
 use super::pmfs::{Pmfs, Selection};
 use super::settings::ResamplingSettings;
 use crate::bidir::{Candidate, ConnectionStrategy, EyeVertex, LightSubpaths, VertexCount, VertexStore, WarmUp};
@@ -205,7 +205,7 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
         if self.settings.learned_visibility {
             self.caches.pmfs.learn_visibility(warm_up.iteration.scene.radius);
         }
-        let mut light_rays = 0.0;
+        let (mut light_rays, mut found) = (0.0, vec![]);
         for set in 1..=WarmUp::SETS {
             let (store, s) = warm_up.light_vertices(paths, set, second_stage.is_some());
             stats.merge(&s);
@@ -214,13 +214,15 @@ impl<F: CacheFactor> ConnectionStrategy for CacheStrategy<F> {
             let (iteration, pmfs) = (&warm_up.iteration, &mut self.caches.pmfs);
             stats.merge(&pmfs.find(iteration, &points, &store, second_stage, u64::MAX - set));
             points.learn(pmfs.found());
+            found.push(pmfs.found_by_group().collect());
             pmfs.learn(&points, &store);
             self.counted.add(&store);
         }
         if self.settings.paths == 0 {
+            let variance = variance_of_paths(&found, paths);
             let VertexCount { vertices, paths } = self.counted;
             let light = (light_rays + VERTEX_COST * vertices as f64) / paths.max(1) as f64;
-            self.paths = best_path_count(pixels, EYE_COST * eye_rays, light);
+            self.paths = best_path_count(pixels, EYE_COST * eye_rays, light, variance);
         }
         self.caches.points = Some(points);
         stats

@@ -40,7 +40,7 @@ pub static TWO_STAGE: IntegratorSpec = IntegratorSpec {
         Nabata, Iwasaki and Dobashi 2020, \"Two-stage resampling for bidirectional path tracing with multiple light \
         sub-paths\". As published: rr_scale=1, allocation=full, proposal_model=per-cache, first_stage=unoccluded, \
         presampled_paths=10000, second_stage_paths=200, \
-        cache_density=0.4%.",
+        cache_density=0.4%, group_size=16.",
     params: &[PARAMS],
     unbiased: true,
     limitations: |_| None,
