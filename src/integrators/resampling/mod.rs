@@ -20,7 +20,7 @@ pub use pcbpt::PCBPT;
 pub use ris::RIS;
 pub use two_stage::TWO_STAGE;
 
-use super::params::presampled::{CONNECTIONS_PER_VERTEX, PRESAMPLED_PATHS, RR_SCALE};
+use super::params::presampled::{CONNECTIONS_PER_VERTEX, RR_SCALE};
 use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES};
 use super::{Integrator, ParamSpec, Params, bidirectional};
 use crate::bidir::Bidirectional;
@@ -29,14 +29,14 @@ use crate::spatial::nearest::Metric;
 use settings::{MAX_GROUP, ResamplingSettings};
 use strategy::CacheStrategy;
 
-/// Parameters of methods with one stage, up to the weights; the latter differ in their default.
+/// Parameters of methods with one stage, but for the number of light sub-paths and the weights, which differ in their
+/// defaults.
 const ONE_STAGE: &[ParamSpec] = &[
     MAX_DEPTH,
     RR_DEPTH_RESAMPLED,
     RR_SCALE,
     HIDE_EMITTERS,
     TECHNIQUES,
-    PRESAMPLED_PATHS,
     CONNECTIONS_PER_VERTEX,
     params::NEAREST_CACHES,
     params::CACHE_DENSITY,

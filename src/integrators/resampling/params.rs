@@ -8,6 +8,16 @@ use super::settings::MAX_GROUP;
 use crate::integrators::params::presampled::PRESAMPLED_PATHS;
 use crate::integrators::params::{AliasValues, Choice, ParamAlias, ParamDefault, ParamSpec};
 
+/// M of `ris`.
+pub(super) const RIS_PATHS: ParamSpec = ParamSpec {
+    default: ParamDefault::Int { default: 1000, min: 1, max: 10_000_000 },
+    long: "The vertices of the first M light sub-paths of an iteration are the proposals of resampling; every cache \
+        point casts a shadow ray to each of them. All pixels share them: fewer make whole regions too bright or too \
+        dark together, more make iterations dearer. Published: 200 (Nabata et al. 2020, resampling-aware weights, \
+        section 6.1).",
+    ..PRESAMPLED_PATHS
+};
+
 /// M₁.
 pub(super) const FIRST_STAGE_PATHS: ParamSpec = ParamSpec {
     aliases: &[ParamAlias { name: "paths", values: AliasValues::ZeroIsAuto }],

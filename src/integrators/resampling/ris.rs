@@ -12,8 +12,8 @@ pub static RIS: IntegratorSpec = IntegratorSpec {
     long: "As `pcbpt`, with weights that take the density of resampled connections into account, so that these get the light they \
         are good at. It is for interiors lit by way of other rooms or through gaps.\n\n\
         Nabata, Iwasaki and Dobashi 2020, \"Resampling-aware weighting functions for bidirectional path tracing using multiple \
-        light sub-paths\". As published: rr_scale=1, allocation=full.",
-    params: &[ONE_STAGE, &[params::weights("resampling-aware"), ALLOCATION]],
+        light sub-paths\". As published: rr_scale=1, allocation=full, presampled_paths=200.",
+    params: &[ONE_STAGE, &[params::RIS_PATHS, params::weights("resampling-aware"), ALLOCATION]],
     unbiased: true,
     limitations: |_| None,
     build: build_one_stage,
