@@ -183,7 +183,8 @@ impl GroupPmf {
         self.found.resize(group.len(), [0.0; 3]);
         self.find_light(caches, group, store, tracer, light);
         self.rows.reset(count, group.len());
-        for (c, light) in light.chunks_exact(count.max(1)).enumerate() {
+        for c in 0..group.len() {
+            let light = &light[c * count..(c + 1) * count];
             self.sum_up(c, caches.leave_one_out_neighbors[group.start + c], light);
             let entries = &self.entries;
             self.rows.push(|e| match light[e] {
