@@ -12,7 +12,7 @@ const SPP: u64 = 32;
 #[test]
 fn parameters_do_not_change_the_expectation() {
     let (ris, two) = (&resampling::RIS, &resampling::TWO_STAGE);
-    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 39] = [
+    let variants: [(&'static IntegratorSpec, &[(&str, &str)]); 41] = [
         (ris, &[("presampled_paths", "1")]),
         (ris, &[("presampled_paths", "2"), ("nearest_caches", "1")]),
         (ris, &[("presampled_paths", "200"), ("nearest_caches", "0")]),
@@ -58,6 +58,8 @@ fn parameters_do_not_change_the_expectation() {
         (two, &[("presampled_paths", "300"), ("second_stage_paths", "16"), ("nearest_caches", "0")]),
         (two, &[("presampled_paths", "1"), ("second_stage_paths", "1"), ("rr_scale", "0.6")]),
         (two, &[("weights", "resampling-aware"), ("second_stage_paths", "8")]),
+        (two, &[("group_size", "1"), ("second_stage_paths", "8")]),
+        (two, &[("group_size", "16"), ("second_stage_paths", "8"), ("proposal_model", "mixture")]),
         (two, &[("weights", "balance"), ("second_stage_paths", "8")]),
         (&bdpt::SPEC, &[]),
         (&bdpt::SPEC, &[("rr_depth", "5")]),

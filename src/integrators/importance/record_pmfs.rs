@@ -205,6 +205,14 @@ struct Source<'a> {
     scheme: SelectionScheme,
 }
 
+/// Light of a vertex that arrives at a record if nothing is between.
+#[derive(Clone, Copy, Default)]
+struct UnshadowedLight {
+    /// Place in the list of weights.
+    at: usize,
+    light: f32,
+}
+
 impl Weights {
     /// Finds the weights of all vertices at all records of a group, by packets of shadow rays from the records to one
     /// vertex after the other.
@@ -218,11 +226,17 @@ impl Weights {
         for v in 0..vertices {
             self.find_vertex(source, v, tracer, &mut queue);
         }
-        queue.flush(tracer, |(at, light): (usize, f32), _| self.seen[at] = light);
+        queue.flush(tracer, |UnshadowedLight { at, light }, _| self.seen[at] = light);
     }
 
     /// Finds the weights of one vertex; those that count visibility arrive by `queue`, which has their places.
-    fn find_vertex(&mut self, source: &Source, v: usize, tracer: &mut Tracer, queue: &mut ShadowQueue<(usize, f32)>) {
+    fn find_vertex(
+        &mut self,
+        source: &Source,
+        v: usize,
+        tracer: &mut Tracer,
+        queue: &mut ShadowQueue<UnshadowedLight>,
+    ) {
         let &Source { records, group, store, vertices, scheme } = source;
         let number = vertices[v] as usize;
         let wants = |distribution| scheme.only.is_none_or(|only| only == distribution);
@@ -245,7 +259,9 @@ impl Weights {
             }
             if wants(Distribution::Visible) {
                 let (segment, seen) = (segment(&records.ends[group.start + record], &end), &mut self.seen);
-                queue.push(&segment, (at, open), tracer, |(at, light), _| seen[at] = light);
+                queue.push(&segment, UnshadowedLight { at, light: open }, tracer, |arriving, _| {
+                    seen[arriving.at] = arriving.light;
+                });
             }
         }
     }

@@ -166,10 +166,16 @@ impl CachePoints {
         &self.ends[cache]
     }
 
-    /// The weight in a cache point's pmf of light from the point `y` whose irradiance there is `irradiance`: the
-    /// irradiance, or the radiance that the surface there scatters to the eye.
+    /// Pmfs at cache points count the BSDFs there.
     #[inline]
-    pub fn pmf_weight(&self, cache: usize, y: Vec3, irradiance: f32) -> f32 {
+    pub fn pmfs_count_bsdfs(&self) -> bool {
+        self.bsdfs.is_some()
+    }
+
+    /// Radiance that the surface at a cache point scatters to the eye, of light from the point `y` that causes the
+    /// irradiance `irradiance` there. Without BSDFs at cache points it is the irradiance.
+    #[inline]
+    pub fn scattered(&self, cache: usize, y: Vec3, irradiance: f32) -> f32 {
         let Some(CacheBsdfs { each, pool }) = &self.bsdfs else { return irradiance };
         let (wo, bsdf) = &each[cache];
         let CacheState { p, side, .. } = self.states[cache];
@@ -287,14 +293,19 @@ mod tests {
                 EyeSubpathVertex { p, side: n, error: 0.0, ng: n, wo: n, bsdf }
             })
             .collect();
-        let mut groups = vec![];
-        group(&mut points, 16, 0, &mut groups);
-        assert!(groups.iter().map(ExactSizeIterator::len).eq(std::iter::repeat_n(16, 62).chain([8])));
-        assert!(groups.windows(2).all(|w| w[0].end == w[1].start) && groups[0].start == 0);
-        for g in &groups {
-            let centre = points[g.clone()].iter().map(|c| c.p).sum::<Vec3>() / g.len() as f32;
-            assert!(points[g.clone()].iter().all(|c| c.p.distance(centre) < 0.4));
+        for size in [16, 8, 3, 1] {
+            let mut groups = vec![];
+            group(&mut points, size, 0, &mut groups);
+            let rest = Some(1000 % size).filter(|rest| *rest > 0);
+            let sizes = std::iter::repeat_n(size, 1000 / size).chain(rest);
+            assert!(groups.iter().map(ExactSizeIterator::len).eq(sizes), "{size}");
+            assert!(groups.windows(2).all(|w| w[0].end == w[1].start) && groups[0].start == 0);
+            for g in &groups {
+                let centre = points[g.clone()].iter().map(|c| c.p).sum::<Vec3>() / g.len() as f32;
+                assert!(points[g.clone()].iter().all(|c| c.p.distance(centre) < 0.4));
+            }
         }
+        let mut groups = vec![];
         group(&mut [], 16, 3, &mut groups);
         assert_eq!(groups.pop(), Some(3..3));
     }

@@ -184,16 +184,12 @@ impl GroupPmf {
         self.find_light(caches, group, store, tracer, light);
         self.rows.reset(count, group.len());
         for c in 0..group.len() {
-            let light = &light[c * count..(c + 1) * count];
+            let light = &mut light[c * count..(c + 1) * count];
             self.sum_up(c, caches.leave_one_out_neighbors[group.start + c], light);
-            let entries = &self.entries;
-            self.rows.push(|e| match light[e] {
-                0.0 => 0.0,
-                full => {
-                    let y = store.vertex(entry(entries, e).vertex as usize);
-                    f64::from(caches.pmf_weight(group.start + c, y.place.position(), full))
-                }
-            });
+            if caches.pmfs_count_bsdfs() {
+                self.count_bsdf(caches, group.start + c, store, light);
+            }
+            self.rows.push(|e| f64::from(light[e]));
         }
         if count > 0 {
             self.found.iter_mut().for_each(|found| *found = found.map(|sum| sum / f64::from(store.paths_traced)));
@@ -231,6 +227,14 @@ impl GroupPmf {
             }
         }
         queue.flush(tracer, |arriving, _| arriving.add_to(light, &mut self.seen));
+    }
+
+    /// Multiplies the light of every entry by the share that the surface at the cache point scatters to the eye.
+    fn count_bsdf(&self, caches: &CachePoints, cache: usize, store: &VertexStore, light: &mut [f32]) {
+        for (e, light) in light.iter_mut().enumerate().filter(|(_, light)| **light > 0.0) {
+            let y = store.vertex(entry(&self.entries, e).vertex as usize);
+            *light = caches.scattered(cache, y.place.position(), *light);
+        }
     }
 
     /// Adds up the visible light at cache point `c` of the group, and the part of it that its neighbours miss.
