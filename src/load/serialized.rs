@@ -1,8 +1,8 @@
 //! Mitsuba's `.serialized` meshes, versions 3 and 4: zlib streams one after the other, and a table of where each
 //! begins.
 //!
-//! Layout (Mitsuba 0.6 documentation, "Serialized mesh loader"): u16 0x041C, u16 version, then deflated: [version 4:
-//! name, zero], u32 flags, u64 vertices, u64 triangles, positions, [normals], [uvs], [colours], indices; at the file's
+//! Layout (Mitsuba 0.6 documentation, "Serialized mesh loader"): u16 0x041C, u16 version, then deflated: u32 flags,
+//! [version 4: name, zero], u64 vertices, u64 triangles, positions, [normals], [uvs], [colours], indices; at the file's
 //! end the offsets of all meshes (u32 in version 3, u64 in version 4) and their number as u32. All little endian.
 
 use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
@@ -119,6 +119,7 @@ impl<R: Read> Inflated<R> {
     }
 
     fn mesh(&mut self, version: u16) -> Result<(MeshDesc, bool), MeshError> {
+        let flags = u32::from_le_bytes(self.bytes()?);
         if version >= 4 {
             let mut length = 0;
             while self.bytes::<1>()? != [0] {
@@ -128,7 +129,6 @@ impl<R: Read> Inflated<R> {
                 }
             }
         }
-        let flags = u32::from_le_bytes(self.bytes()?);
         let vertices = u64::from_le_bytes(self.bytes()?);
         let triangles = u64::from_le_bytes(self.bytes()?);
         let float = if flags & DOUBLE != 0 { 8 } else { 4 };
@@ -205,10 +205,10 @@ mod tests {
             out.extend([0x1C, 0x04]);
             out.extend(version.to_le_bytes());
             let mut z = ZlibEncoder::new(&mut out, Compression::default());
+            z.write_all(&flags.to_le_bytes()).unwrap();
             if version == 4 {
                 z.write_all(b"name\0").unwrap();
             }
-            z.write_all(&flags.to_le_bytes()).unwrap();
             z.write_all(&3u64.to_le_bytes()).unwrap();
             z.write_all(&1u64.to_le_bytes()).unwrap();
             let mut put = |v: f64| {
@@ -251,6 +251,23 @@ mod tests {
                 assert_eq!(m.triangles, [[0, 1, 2]]);
             }
         }
+    }
+
+    /// tests/data/meshes/serialized.py wrote the file; Mitsuba 3.9.1, scalar_rgb, reads the same numbers in it.
+    #[test]
+    fn a_file_of_version_4_is_read_as_mitsuba_reads_it() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/meshes/version4.serialized");
+        let positions = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.5]].map(Vec3::from);
+        let plain = read_serialized(&path, 0, MeshOptions::default()).unwrap().mesh;
+        assert_eq!((plain.positions.as_slice(), plain.uvs.len(), plain.colors.len()), (positions.as_slice(), 0, 0));
+        assert_eq!(plain.triangles, [[0, 1, 2], [0, 2, 3]]);
+        let generated = [[0.121_771_54, -0.121_771_54, 0.985_060_1], [0.0, 0.0, 1.0]].map(Vec3::from);
+        assert!(plain.normals.iter().zip(generated).all(|(n, want)| (n - want).length() < 1e-6), "{:?}", plain.normals);
+        let full = read_serialized(&path, 1, MeshOptions::default()).unwrap().mesh;
+        assert_eq!(full.positions, positions);
+        assert_eq!(full.normals, [[0.0, 0.0, 1.0], [0.0, 0.6, 0.8], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]].map(Vec3::from));
+        assert_eq!(full.uvs, [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]);
+        assert_eq!(full.colors, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]].map(Rgb::from));
     }
 
     #[test]
