@@ -10,7 +10,7 @@ use crate::scene::diag::Diagnostic;
 use crate::scene::{ImageDesc, ImageId, MeshDesc, MeshId, SceneDesc, Span};
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The meaning of a picture's values.
@@ -18,8 +18,45 @@ use std::sync::Arc;
 pub(super) enum ImageUse {
     /// Colours: eight-bit files are sRGB.
     Color,
+    /// sRGB, whatever the format.
+    Srgb,
     /// Plain numbers.
     Data,
+    /// Powers of plain numbers in [0, 1]: the exponent's bits.
+    Power(u32),
+}
+
+impl ImageUse {
+    /// Values that are raised to the power `exponent`.
+    pub(super) fn power(exponent: f32) -> ImageUse {
+        ImageUse::Power(exponent.to_bits())
+    }
+
+    fn read(self, path: &Path) -> Result<Image, ImageError> {
+        let encoding = match self {
+            ImageUse::Color => Encoding::Auto,
+            ImageUse::Srgb => Encoding::Srgb,
+            ImageUse::Data | ImageUse::Power(_) => Encoding::Linear,
+        };
+        let image = read_image(path, encoding)?;
+        Ok(match self {
+            ImageUse::Power(bits) => raised(&image, f32::from_bits(bits)),
+            _ => image,
+        })
+    }
+}
+
+/// A picture of plain numbers with every value but alpha raised to a power.
+fn raised(image: &Image, exponent: f32) -> Image {
+    let channels = image.channels as usize;
+    let power = |(i, v): (usize, f32)| if i % channels == 3 { v } else { v.max(0.0).powf(exponent) };
+    let pixels = match &image.pixels {
+        Pixels::Srgb8(v) | Pixels::Linear8(v) => {
+            v.iter().map(|&v| f32::from(v) / 255.0).enumerate().map(power).collect()
+        }
+        Pixels::F32(v) => v.iter().copied().enumerate().map(power).collect(),
+    };
+    Image { width: image.width, height: image.height, channels: image.channels, pixels: Pixels::F32(pixels) }
 }
 
 /// Where triangles come from.
@@ -138,7 +175,7 @@ impl Assets {
     }
 
     fn read_images(&self) -> Vec<Result<Image, ImageError>> {
-        self.images.par_iter().map(|(path, usage, _)| read_image(path, encoding(*usage))).collect()
+        self.images.par_iter().map(|(path, usage, _)| usage.read(path)).collect()
     }
 
     fn add_images(self, images: Vec<Result<Image, ImageError>>, scene: &mut SceneDesc, report: &mut Report) {
@@ -163,15 +200,8 @@ impl Assets {
     }
 }
 
-fn missing_mesh(path: &std::path::Path, e: &MeshError) -> Diagnostic {
+fn missing_mesh(path: &Path, e: &MeshError) -> Diagnostic {
     Diagnostic::error("load::mesh", format!("cannot read the mesh `{}`: {e}", path.display()))
-}
-
-fn encoding(usage: ImageUse) -> Encoding {
-    match usage {
-        ImageUse::Color => Encoding::Auto,
-        ImageUse::Data => Encoding::Linear,
-    }
 }
 
 /// One pixel that nobody overlooks.

@@ -2,6 +2,8 @@
 
 use crate::scene::Severity;
 use crate::scene::diag::{Diagnostic, Diagnostics};
+use std::collections::HashSet;
+use std::sync::Arc;
 
 /// More errors than this help nobody.
 pub(super) const MAX_ERRORS: usize = 20;
@@ -12,6 +14,8 @@ pub(super) struct Report {
     diagnostics: Diagnostics,
     errors: usize,
     io: bool,
+    /// Messages that have a place, by code, text, file and offset.
+    seen: HashSet<(&'static str, String, usize, usize)>,
 }
 
 impl Report {
@@ -19,8 +23,15 @@ impl Report {
         Report::default()
     }
 
-    /// Adds a message; errors beyond the limit are counted only.
+    /// Adds a message, once for each place (an object that several others refer to is read for each of them); errors
+    /// beyond the limit are counted only.
     pub(super) fn push(&mut self, d: Diagnostic) {
+        if let Some(span) = &d.span {
+            let file = Arc::as_ptr(&span.source) as usize;
+            if !self.seen.insert((d.code, d.message.clone(), file, span.range.start)) {
+                return;
+            }
+        }
         if d.severity == Severity::Error {
             self.errors += 1;
             if self.errors > MAX_ERRORS {

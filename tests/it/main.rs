@@ -16,6 +16,7 @@ mod rays;
 mod regression;
 mod resampling;
 mod scale;
+mod scene_files;
 mod support;
 mod techniques;
 mod weights;

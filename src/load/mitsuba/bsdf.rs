@@ -121,7 +121,7 @@ impl Builder<'_> {
         objects.into_iter().map(|o| self.bsdf(o)).collect::<Vec<_>>().into_iter().collect()
     }
 
-    /// A texture of plain numbers (with or without one of the given names) and one material.
+    /// A texture (with or without one of the given names) and one material.
     fn texture_and_nested(&mut self, p: &Props<'_>, names: [&'static str; 2]) -> Option<(TextureId, BsdfId)> {
         let mut texture = names.into_iter().find_map(|n| p.get_index(n));
         let mut nested = Vec::new();
@@ -137,7 +137,8 @@ impl Builder<'_> {
             return None;
         };
         let object = self.resolve(texture)?;
-        let (texture, nested) = (self.texture(texture, object, true), self.bsdf(nested));
+        self.warn_of_decoding(object, p.plugin);
+        let (texture, nested) = (self.texture(texture, object), self.bsdf(nested));
         Some((texture?, nested?))
     }
 }

@@ -27,7 +27,7 @@ impl Builder<'_> {
         let object = self.resolve(given)?;
         let node = self.node(object);
         if node.tag == "texture" {
-            return self.texture(given, object, false).map(ColorDesc::Texture);
+            return self.texture(given, object).map(ColorDesc::Texture);
         }
         self.constant(node, purpose, "a colour or texture").map(ColorDesc::Constant)
     }
@@ -49,7 +49,7 @@ impl Builder<'_> {
         let object = self.resolve(given)?;
         let node = self.node(object);
         if node.tag == "texture" {
-            return self.texture(given, object, true).map(ScalarDesc::Texture);
+            return self.texture(given, object).map(ScalarDesc::Texture);
         }
         let color = self.constant(node, Purpose::Reflectance, "a number or texture")?;
         // The luminance weights do not sum to one exactly: a grey value must stay what it is.
@@ -64,6 +64,10 @@ impl Builder<'_> {
             ("blackbody", _) => return self.blackbody(node),
             ("float" | "integer", Some(text)) => number(text).map(|v| Rgb::grey(v as f32)),
             ("rgb" | "srgb", Some(text)) => parse_rgb(text, node.tag == "srgb"),
+            // A spectrum of three samples is RGB: the standard build of Mitsuba 0.6.
+            ("spectrum", Some(text)) if node.legacy && matches!(numbers(text).as_deref(), Ok(&[_, _, _])) => {
+                parse_rgb(text, false)
+            }
             ("spectrum", Some(text)) => spectrum::parse(text, purpose),
             ("spectrum", None) if node.attr("filename").is_some() => return self.spectrum_file(node, purpose),
             ("float" | "integer" | "rgb" | "srgb" | "spectrum", None) => {

@@ -4,6 +4,7 @@ use super::objects::Builder;
 use super::props::Props;
 use super::spectrum::Purpose::{Emission, Reflectance};
 use super::sun;
+use super::texture::legacy_gamma;
 use crate::load::assets::ImageUse;
 use crate::scene::diag::Diagnostic;
 use crate::scene::{EmitterDesc, EmitterKind};
@@ -14,10 +15,13 @@ const PLUGINS: [&str; 9] = ["area", "point", "spot", "directional", "constant", 
 impl Builder<'_> {
     /// An `<emitter>` that stands in the scene itself.
     pub(super) fn emitter(&mut self, node: usize) {
-        let Some(props) = self.props(node) else { return };
-        if let Some(kind) = self.emitter_kind(&props) {
-            self.scene.emitters.push(EmitterDesc { kind, span: Some(props.span()) });
+        // Built for the shapes that refer to it.
+        if self.node(node).attr("type").is_some_and(|a| a.value == "area") && self.referenced.contains(&node) {
+            return;
         }
+        let Some(props) = self.props(node) else { return };
+        let Some(kind) = self.emitter_kind(&props) else { return };
+        self.scene.emitters.push(EmitterDesc { kind, span: Some(props.span()) });
         props.ignore(&["sampling_weight"]);
         props.finish();
     }
@@ -27,7 +31,8 @@ impl Builder<'_> {
         Some(match p.plugin {
             "area" => {
                 let d = Diagnostic::error("scene::misplaced-element", "an area light belongs inside a <shape>");
-                self.push(d.at(p.span()).label("no surface here"));
+                let help = "a <shape> may also refer to it: give it an `id` and write <ref id=\"…\"/> in the <shape>";
+                self.push(d.at(p.span()).label("no surface here").help(help));
                 return None;
             }
             "point" => EmitterKind::Point {
@@ -60,8 +65,9 @@ impl Builder<'_> {
             "constant" => EmitterKind::Constant { radiance: self.rgb(p, "radiance", 1.0, Emission) },
             "envmap" => {
                 let (path, span) = self.file(p, "filename")?;
+                let usage = legacy_gamma(p).unwrap_or(ImageUse::Color);
                 EmitterKind::Envmap {
-                    image: self.assets.image(path, ImageUse::Color, span),
+                    image: self.assets.image(path, usage, span),
                     scale: p.float_or("scale", 1.0) as f32,
                     to_world: to_world(p),
                 }

@@ -5,6 +5,7 @@
 //! nobody asked for; the other files build what the plugins describe.
 
 mod bsdf;
+mod cie;
 mod color;
 mod conductors;
 mod document;
@@ -33,8 +34,21 @@ use std::path::Path;
 pub(super) use transform::look_at;
 
 /// Elements that may stand directly in a scene.
-const TOP_LEVEL: [&str; 10] =
-    ["integrator", "sensor", "bsdf", "texture", "shape", "emitter", "medium", "volume", "ref", "spectrum"];
+const TOP_LEVEL: [&str; 13] = [
+    "integrator",
+    "sensor",
+    "film",
+    "sampler",
+    "rfilter",
+    "bsdf",
+    "texture",
+    "shape",
+    "emitter",
+    "medium",
+    "volume",
+    "ref",
+    "spectrum",
+];
 
 /// Reads the file and everything it names.
 pub(super) fn load(path: &Path, options: &LoadOptions, report: &mut Report) -> Option<SceneDesc> {
@@ -71,7 +85,7 @@ impl Builder<'_> {
                 "shape" => self.shape(child),
                 "emitter" => self.emitter(child),
                 // Built when something refers to them; those that nobody uses are still checked below.
-                "bsdf" | "texture" => {}
+                "bsdf" | "texture" | "film" | "sampler" | "rfilter" => {}
                 "medium" | "volume" => self.ignored_medium(child),
                 "ref" | "spectrum" => {}
                 tag => {
@@ -89,8 +103,12 @@ impl Builder<'_> {
             if self.report.borrow().full() {
                 return;
             }
-            if self.tree.nodes[child].tag == "bsdf" {
-                self.bsdf(child);
+            match self.tree.nodes[child].tag.as_str() {
+                "bsdf" => drop(self.bsdf(child)),
+                "film" => drop(self.film(child)),
+                "sampler" => drop(self.sampler(child)),
+                "rfilter" => drop(self.filter(child)),
+                _ => {}
             }
         }
     }

@@ -7,7 +7,7 @@ use crate::load::report::Report;
 use crate::scene::diag::{Diagnostic, nearest};
 use crate::scene::{BsdfId, GroupId, SceneDesc, Span, TextureId};
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 /// A chain of objects within objects longer than this is a mistake, if it is not a circle.
@@ -20,15 +20,18 @@ pub(super) struct Builder<'t> {
     pub scene: SceneDesc,
     pub assets: Assets,
     pub bsdfs: HashMap<usize, Option<BsdfId>>,
-    /// By element and whether values are read as plain numbers.
-    pub textures: HashMap<(usize, bool), Option<TextureId>>,
+    pub textures: HashMap<usize, Option<TextureId>>,
     pub groups: HashMap<usize, Option<GroupId>>,
+    /// Elements that a `<ref>` names.
+    pub referenced: HashSet<usize>,
     /// Elements under construction, outermost first.
     open: Vec<usize>,
 }
 
 impl<'t> Builder<'t> {
     pub(super) fn new(tree: &'t Tree, report: &'t RefCell<Report>, assets: Assets) -> Builder<'t> {
+        let names = tree.nodes.iter().filter(|n| n.tag == "ref").filter_map(|n| n.attr("id"));
+        let referenced = names.filter_map(|id| tree.ids.get(&id.value).copied()).collect();
         Builder {
             tree,
             report,
@@ -37,6 +40,7 @@ impl<'t> Builder<'t> {
             bsdfs: HashMap::new(),
             textures: HashMap::new(),
             groups: HashMap::new(),
+            referenced,
             open: Vec::new(),
         }
     }

@@ -59,15 +59,20 @@ impl<'t> Props<'t> {
             if !OBJECT_TAGS.contains(&element.tag.as_str()) {
                 check_attributes(element, report);
             }
-            let twice = items.iter().any(|i| name.is_some() && i.name == name);
-            if twice {
-                let message = format!("`{}` is given twice", name.as_deref().unwrap_or(""));
-                report
-                    .borrow_mut()
-                    .push(Diagnostic::error("scene::duplicate-property", message).at(element.span_of("name")));
-            }
-            // The second of two counts as seen: one message is enough.
-            items.push(Item { name, node: child, used: Cell::new(twice) });
+            let earlier = items.iter_mut().find(|i| name.is_some() && i.name == name);
+            let Some(earlier) = earlier else {
+                items.push(Item { name, node: child, used: Cell::new(false) });
+                continue;
+            };
+            let message = format!("`{}` is given twice", name.as_deref().unwrap_or(""));
+            let d = if element.legacy {
+                // As in Mitsuba 0.6.
+                earlier.node = child;
+                Diagnostic::warning("scene::duplicate-property", message).label("this one holds")
+            } else {
+                Diagnostic::error("scene::duplicate-property", message)
+            };
+            report.borrow_mut().push(d.at(element.span_of("name")));
         }
         Some(Props { tree, report, node, plugin, items, asked: RefCell::default() })
     }

@@ -76,7 +76,8 @@ impl Builder<'_> {
         })
     }
 
-    fn sampler(&mut self, node: usize) -> Option<u32> {
+    /// Samples per pixel that a `<sampler>` asks for.
+    pub(super) fn sampler(&mut self, node: usize) -> Option<u32> {
         let p = self.props(node)?;
         // Every sampler of Mitsuba's is accepted: which numbers are drawn is the integrators' own business.
         p.ignore(&["seed", "dimension", "scramble", "sample_offset", "jitter"]);
@@ -85,7 +86,8 @@ impl Builder<'_> {
         count
     }
 
-    fn film(&mut self, node: usize) -> Option<FilmDesc> {
+    /// Size, crop and filter of a `<film>`.
+    pub(super) fn film(&mut self, node: usize) -> Option<FilmDesc> {
         let p = self.props(node)?;
         if !matches!(p.plugin, "hdrfilm" | "ldrfilm" | "mfilm") {
             self.unknown_plugin(&p, &["hdrfilm", "ldrfilm"]);
@@ -136,7 +138,8 @@ impl Builder<'_> {
         Some(FilmDesc { width, height, crop, filter, span: Some(p.span()) })
     }
 
-    fn filter(&mut self, node: usize) -> Option<FilterDesc> {
+    /// The pixel filter that an `<rfilter>` describes.
+    pub(super) fn filter(&mut self, node: usize) -> Option<FilterDesc> {
         let p = self.props(node)?;
         let filter = match p.plugin {
             "box" => {

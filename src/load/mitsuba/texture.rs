@@ -8,10 +8,9 @@ use crate::scene::diag::Diagnostic;
 use crate::scene::{TextureDesc, TextureFilter, TextureId, WrapMode};
 
 impl Builder<'_> {
-    /// The texture `object`, reached from the element `from`; `data` reads eight-bit pictures as plain numbers, not as
-    /// sRGB.
-    pub(super) fn texture(&mut self, from: usize, object: usize, data: bool) -> Option<TextureId> {
-        if let Some(done) = self.textures.get(&(object, data)) {
+    /// The texture `object`, reached from the element `from`.
+    pub(super) fn texture(&mut self, from: usize, object: usize) -> Option<TextureId> {
+        if let Some(done) = self.textures.get(&object) {
             return *done;
         }
         let node = self.node(object);
@@ -22,16 +21,16 @@ impl Builder<'_> {
         }
         let built = self.guarded(object, from, |b| {
             let props = b.props(object)?;
-            let desc = b.texture_desc(&props, data)?;
+            let desc = b.texture_desc(&props)?;
             props.finish();
             b.scene.textures.push(desc);
             Some(TextureId((b.scene.textures.len() - 1) as u32))
         });
-        self.textures.insert((object, data), built);
+        self.textures.insert(object, built);
         built
     }
 
-    fn texture_desc(&mut self, p: &Props<'_>, data: bool) -> Option<TextureDesc> {
+    fn texture_desc(&mut self, p: &Props<'_>) -> Option<TextureDesc> {
         match p.plugin {
             "bitmap" => {
                 let to_uv = to_uv(p);
@@ -44,13 +43,12 @@ impl Builder<'_> {
                 let filter = p.choice("filter_type", &filters, TextureFilter::Bilinear);
                 let wraps = [("repeat", WrapMode::Repeat), ("mirror", WrapMode::Mirror), ("clamp", WrapMode::Clamp)];
                 let wrap = p.choice("wrap_mode", &wraps, WrapMode::Repeat);
-                // 0.6 says linear with a gamma of one; any other gamma is taken for sRGB.
-                let gamma = p.float("gamma");
-                let raw = p.boolean_or("raw", gamma == Some(1.0));
+                let usage = if p.boolean_or("raw", false) { ImageUse::Data } else { ImageUse::Color };
+                let usage = legacy_gamma(p).unwrap_or(usage);
                 p.ignore(&["accel", "format", "max_anisotropy", "cache"]);
                 let scale = p.float_or("scale", 1.0) as f32;
                 let (path, span) = self.file(p, "filename")?;
-                let image = self.assets.image(path, if raw || data { ImageUse::Data } else { ImageUse::Color }, span);
+                let image = self.assets.image(path, usage, span);
                 Some(TextureDesc::Bitmap { image, to_uv, filter, wrap, scale })
             }
             "checkerboard" => {
@@ -59,7 +57,7 @@ impl Builder<'_> {
                 Some(TextureDesc::Checkerboard { color0, color1, to_uv: to_uv(p) })
             }
             // 0.6: a texture times a number.
-            "scale" => self.scaled(p, data),
+            "scale" => self.scaled(p),
             _ => {
                 self.unknown_plugin(p, &["bitmap", "checkerboard", "scale"]);
                 None
@@ -67,14 +65,45 @@ impl Builder<'_> {
         }
     }
 
-    fn scaled(&mut self, p: &Props<'_>, data: bool) -> Option<TextureDesc> {
+    /// Says that a normal or bump map is decoded as sRGB where the file does not ask for it in so many words: Mitsuba's
+    /// default, and mostly not what an author means.
+    pub(super) fn warn_of_decoding(&self, object: usize, plugin: &str) {
+        let node = self.node(object);
+        let child = |wanted: &str| {
+            node.children.iter().map(|&c| self.node(c)).find(|c| c.attr("name").is_some_and(|a| a.value == wanted))
+        };
+        match node.attr("type").map(|a| a.value.as_str()) {
+            Some("scale") => {
+                let nested = node.children.iter().filter(|&&c| matches!(self.node(c).tag.as_str(), "texture" | "ref"));
+                nested.filter_map(|&c| self.resolve(c)).for_each(|c| self.warn_of_decoding(c, plugin));
+            }
+            Some("bitmap") if child("raw").is_none() && child("gamma").is_none() => {
+                let Some(file) = child("filename").and_then(|c| c.attr("value")) else { return };
+                let ending = file.value.rsplit('.').next().unwrap_or("").to_ascii_lowercase();
+                if FLOAT_PICTURES.contains(&ending.as_str()) {
+                    return;
+                }
+                let message = format!("`{}` is decoded from sRGB for a `{plugin}`, as in Mitsuba", file.value);
+                let remedy = if node.legacy {
+                    "<float name=\"gamma\" value=\"1\"/>"
+                } else {
+                    "<boolean name=\"raw\" value=\"true\"/>"
+                };
+                let help = format!("if the picture holds plain numbers, write {remedy} in its <texture>");
+                self.push(Diagnostic::warning("scene::decoded-data", message).at(file.span.clone()).help(help));
+            }
+            _ => {}
+        }
+    }
+
+    fn scaled(&mut self, p: &Props<'_>) -> Option<TextureDesc> {
         let factor = p.float_or("scale", 1.0) as f32;
         let &[nested] = p.objects().as_slice() else {
             p.error("scene::nested-texture", "`scale` needs one nested <texture>");
             return None;
         };
         let object = self.resolve(nested)?;
-        let id = self.texture(nested, object, data)?;
+        let id = self.texture(nested, object)?;
         let mut desc = self.scene.textures[id.index()].clone();
         match &mut desc {
             TextureDesc::Bitmap { scale, .. } => *scale *= factor,
@@ -91,6 +120,28 @@ impl Builder<'_> {
             }
         }
         Some(desc)
+    }
+}
+
+/// Endings of pictures in linear floats, which are not decoded.
+const FLOAT_PICTURES: [&str; 5] = ["exr", "hdr", "rgbe", "pfm", "pic"];
+
+/// `gamma` of Mitsuba 0.6: 1 is linear, −1 sRGB, 0 (or nothing) what the format says, anything else a power.
+pub(super) fn legacy_gamma(p: &Props<'_>) -> Option<ImageUse> {
+    if !p.element().legacy {
+        return None;
+    }
+    match p.float("gamma")? {
+        1.0 => Some(ImageUse::Data),
+        -1.0 => Some(ImageUse::Srgb),
+        0.0 => None,
+        gamma if gamma > 0.0 => Some(ImageUse::power(gamma as f32)),
+        gamma => {
+            if let Some(node) = p.get("gamma") {
+                p.bad_value(node, "value", format!("a gamma of {gamma}"), "a positive number, or -1 for sRGB");
+            }
+            None
+        }
     }
 }
 

@@ -1,0 +1,35 @@
+//! Properties of versions 0.5 and 0.6 that Mitsuba 3 no longer has, or reads otherwise.
+
+use super::*;
+
+/// A scene of version 0.6.
+fn old(inside: &str) -> String {
+    scene(inside).replacen("3.0.0", "0.6.0", 1)
+}
+
+#[test]
+fn the_later_of_two_properties_holds() {
+    let inside = "<shape type=\"rectangle\">\n<boolean name=\"flipNormals\" value=\"false\"/>\n<boolean name=\"flipNormals\" value=\"true\"/></shape>";
+    let (s, found) = load(&old(inside)).unwrap();
+    assert!(s.shapes[1].flip_normals);
+    assert_eq!(found.list[0].severity, Severity::Warning);
+    assert_eq!(messages(Ok((s, found))), [("scene::duplicate-property", 4, 16)]);
+    // Mitsuba 3 refuses it.
+    let inside = inside.replace("flipNormals", "flip_normals");
+    let e = load(&scene(&inside)).unwrap_err();
+    assert_eq!(messages(Err(e)), [("scene::duplicate-property", 4, 16)]);
+}
+
+#[test]
+fn three_numbers_in_a_spectrum_are_rgb() {
+    for numbers in ["0.1, 0.2, 0.3", "0.1 0.2 0.3", "0.1,0.2,0.3", " 0.1 , 0.2  0.3 "] {
+        let inside =
+            format!("<bsdf type=\"diffuse\" id=\"d\"><spectrum name=\"reflectance\" value=\"{numbers}\"/></bsdf>");
+        let (s, _) = load(&old(&inside)).unwrap();
+        let BsdfKind::Model(BsdfModel::Diffuse(p)) = bsdf(&s, "d") else { panic!() };
+        assert_eq!(p.reflectance, ColorDesc::Constant(Rgb::new(0.1, 0.2, 0.3)), "{numbers}");
+        assert_eq!(messages(load(&scene(&inside))), [("scene::bad-value", 2, 65)], "{numbers}");
+    }
+    let two = "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"1 2\"/></bsdf>";
+    assert_eq!(messages(load(&old(two)))[0].0, "scene::bad-value");
+}
