@@ -3,13 +3,14 @@
 use super::Failure;
 use super::measure_args::BenchArgs;
 use super::session::{SceneMethods, Session, to_json};
-use crate::image::atomic_write;
+use crate::image::{atomic_write, read_regular_text};
 use crate::measure::bench::{Baseline, Change, Row, Table as Measured, Verdict, against, calibrate};
 use crate::measure::converge::{EqualTimeTask, converge};
 use crate::measure::curve::runs_of;
 use crate::measure::report::Table;
 use crate::measure::{LoadWatch, Machine};
-use crate::render::Method;
+use crate::render::files::write_or_rescue;
+use crate::render::{Method, OutputFiles};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -24,8 +25,11 @@ struct Answer<'a> {
 
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     let baseline = args.against.as_deref().map(read).transpose()?;
-    let session = Session::new(&args.measure)?;
     let scenes = find_scenes(&args.folder)?;
+    let mut outputs = OutputFiles::default();
+    args.save.iter().for_each(|path| outputs.add("--save", path));
+    let inputs = scenes.iter().chain(&args.against).map(PathBuf::as_path);
+    let session = Session::new(&args.measure, outputs, inputs)?;
     let (watch, mut rows, mut backend) = (LoadWatch::start(), vec![], String::new());
     for path in &scenes {
         let scene = session.prepare(path, Some(&args.references))?;
@@ -47,7 +51,9 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     session.say(&measured.load.sentence());
     if let Some(path) = &args.save {
         let text = to_json(&measured)?;
-        atomic_write(path, |w| writeln!(w, "{text}")).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+        write_or_rescue(path, |path| {
+            atomic_write(path, |w| writeln!(w, "{text}")).map_err(|e| format!("{}: {e}", path.display()))
+        })?;
     }
     let worse = verdicts.iter().flatten().filter(|v| v.is_worse()).count();
     match (verdicts, worse) {
@@ -60,7 +66,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
 }
 
 fn read(path: &Path) -> Result<Baseline, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+    let text = read_regular_text(path).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
     serde_json::from_str(&text)
         .map_err(|e| Failure::Input(format!("{}: not what `bench --save` writes: {e}", path.display())))
 }

@@ -9,6 +9,7 @@ use crate::image::{
     Encoding, ExrFile, Image, ImageError, ImageFault, Layer, OutputFormat, Picture, Report, compare, read_image,
     write_picture,
 };
+use crate::render::OutputFiles;
 use serde::Serialize;
 use std::path::Path;
 
@@ -37,6 +38,10 @@ fn read(path: &Path) -> Result<(Image, Option<Colours>), Failure> {
 pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
     if let Some(path) = &args.error_image {
         OutputFormat::of(path).map_err(Failure::input)?;
+        let mut outputs = OutputFiles::default();
+        outputs.add("--error-image", path);
+        outputs.check_inputs([args.image.as_path(), args.reference.as_path()])?;
+        outputs.check()?;
     }
     let ((image, variance), (reference, reference_variance)) = (read(&args.image)?, read(&args.reference)?);
     let report = compare(&image, &reference).map_err(Failure::input)?;

@@ -9,14 +9,22 @@ use crate::measure::curve::csv;
 use crate::measure::reference::Reference;
 use crate::measure::study::{MethodSummary, SceneStudy, Study};
 use crate::measure::{LoadWatch, Machine};
-use crate::render::Observer;
-use std::path::Path;
+use crate::render::{Observer, OutputFiles};
+use std::path::{Path, PathBuf};
+
+/// Files of a report in its folder.
+const JSON: &str = "converge.json";
+const CSV: &str = "converge.csv";
+const PAGE: &str = "index.html";
 
 pub(crate) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
     if args.reference.is_some() && args.scenes.len() > 1 {
         return Err(Failure::Input("--reference belongs to one scene, and there are more".into()));
     }
-    let session = Session::new(&args.measure)?;
+    let mut outputs = OutputFiles::default();
+    args.report.iter().for_each(|folder| outputs.add_folder("--report", folder, &[JSON, CSV, PAGE]));
+    let inputs = args.scenes.iter().chain(&args.reference).map(PathBuf::as_path);
+    let session = Session::new(&args.measure, outputs, inputs)?;
     let labels: Vec<String> = session.methods.iter().filter_map(|m| m.label.clone()).collect();
     let first = || labels.first().cloned().unwrap_or_default();
     let baseline = args.baseline.clone().unwrap_or_else(first);
@@ -63,9 +71,7 @@ pub(crate) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
     }
     if let Some(folder) = &args.report {
         let rows = csv(study.scenes.iter().map(|s| (s.scene.as_str(), s.runs.as_slice())));
-        for (name, text) in
-            [("converge.json", to_json(&study)?), ("converge.csv", rows), ("index.html", study.page(&references))]
-        {
+        for (name, text) in [(JSON, to_json(&study)?), (CSV, rows), (PAGE, study.page(&references))] {
             session.say(&format!("wrote {}", write_text(folder, name, &text)?.display()));
         }
     }

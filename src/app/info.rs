@@ -7,9 +7,10 @@ use super::environment::Environment;
 use super::skeleton;
 use crate::image::{OutputFormat, Pixels};
 use crate::prepared::PreparedScene;
-use crate::render::job;
+use crate::render::{OutputFiles, job};
 use crate::scene::SceneDesc;
 use crate::skeleton::Skeleton;
+use std::path::PathBuf;
 use std::time::Instant;
 
 fn mib(bytes: usize) -> String {
@@ -24,8 +25,14 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     if let Some(path) = &args.skeleton_image {
         OutputFormat::of(path).map_err(Failure::input)?;
     }
+    let mut outputs = OutputFiles::default();
+    args.skeleton.iter().for_each(|path| outputs.add("--skeleton", path));
+    args.skeleton_image.iter().for_each(|path| outputs.add("--skeleton-image", path));
+    outputs.check_inputs([args.scene.scene.as_path()])?;
+    outputs.check()?;
     let environment = Environment::new(None, false)?;
     let loaded = job::load(&args.scene.request(), environment.runtime())?;
+    outputs.check_inputs(loaded.desc.files.iter().map(PathBuf::as_path))?;
     out!("scene       {}", args.scene.scene.display());
     describe_file(&loaded.desc);
     let scene = job::prepare(loaded, &plain_options(&environment), environment.runtime())?.scene;

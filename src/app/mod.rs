@@ -1,11 +1,9 @@
 //! The command line; the only room that prints.
 
-/// Prints a line of results. A reader that has gone away (`| head`) is not an error.
+/// Prints a line of results. A reader that has gone away (`| head`) is not an error; any other failure is one at the
+/// end of the command.
 macro_rules! out {
-    ($($text:tt)*) => {{
-        use std::io::Write;
-        let _ = writeln!(std::io::stdout(), $($text)*);
-    }};
+    ($($text:tt)*) => { $crate::app::output::print(format_args!($($text)*)) };
 }
 
 /// Prints a line to standard error, in the same way.
@@ -27,6 +25,7 @@ mod info;
 mod list;
 mod measure_args;
 mod merge;
+mod output;
 mod processor;
 mod profile;
 mod render;
@@ -61,6 +60,17 @@ impl Failure {
 
     pub(crate) fn io(e: impl std::fmt::Display) -> Failure {
         Failure::Io(e.to_string())
+    }
+
+    /// Prints the failure to standard error, unless it has been explained there already.
+    fn print(&self) {
+        match self {
+            Failure::Input(text) | Failure::Io(text) if text.is_empty() => {}
+            Failure::Input(text) | Failure::Io(text) => note!("error: {text}"),
+            Failure::NonFinite(n) => note!("error: {n} samples were not finite (--strict)"),
+            Failure::Regression(n) => note!("error: worse than the baseline beyond noise: {n} rows"),
+            Failure::Interrupted => note!("interrupted"),
+        }
     }
 
     fn exit_code(&self) -> u8 {
@@ -103,8 +113,14 @@ fn parse_and_run() -> ExitCode {
         Err(e) => {
             // Help and version are errors to clap, but not to the user.
             let code = if e.use_stderr() { 2 } else { 0 };
-            let _ = e.print();
-            return ExitCode::from(code);
+            let printed = e.print().map_err(|e| output::failure(&e));
+            return match printed {
+                Err(Some(failure)) if code == 0 => {
+                    failure.print();
+                    ExitCode::from(failure.exit_code())
+                }
+                _ => ExitCode::from(code),
+            };
         }
     };
     let result = match cli.command {
@@ -119,16 +135,11 @@ fn parse_and_run() -> ExitCode {
         cli::Command::Merge(args) => merge::run(&args),
         cli::Command::Bench(args) => bench::run(&args),
     };
+    let result = result.and_then(|()| output::finish());
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            match &failure {
-                Failure::Input(text) | Failure::Io(text) if text.is_empty() => {}
-                Failure::Input(text) | Failure::Io(text) => note!("error: {text}"),
-                Failure::NonFinite(n) => note!("error: {n} samples were not finite (--strict)"),
-                Failure::Regression(n) => note!("error: worse than the baseline beyond noise: {n} rows"),
-                Failure::Interrupted => note!("interrupted"),
-            }
+            failure.print();
             ExitCode::from(failure.exit_code())
         }
     }

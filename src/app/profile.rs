@@ -10,10 +10,19 @@ use crate::measure::profile::{Profile, Profiled, Task, profile};
 use crate::measure::report::pictures::doubles;
 use crate::measure::report::{Page, Shown, Table, picture_group};
 use crate::measure::visibility::CostMap;
+use crate::render::OutputFiles;
 use std::path::Path;
 
+/// Files of a report in its folder.
+const JSON: &str = "profile.json";
+const COST: &str = "cost.exr";
+const BLOCKED: &str = "blocked.exr";
+const PAGE: &str = "index.html";
+
 pub(crate) fn run(args: &ProfileArgs) -> Result<(), Failure> {
-    let session = Session::new(&args.measure)?;
+    let mut outputs = OutputFiles::default();
+    args.report.iter().for_each(|folder| outputs.add_folder("--report", folder, &[JSON, COST, BLOCKED, PAGE]));
+    let session = Session::new(&args.measure, outputs, [args.scene.as_path()])?;
     let mut scene = session.prepare(&args.scene, None)?;
     let method = match scene.methods.as_slice() {
         [one] => one.clone(),
@@ -43,12 +52,12 @@ pub(crate) fn run(args: &ProfileArgs) -> Result<(), Failure> {
     }
     session.say(&found.load.sentence());
     if let Some(folder) = &args.report {
-        session.say(&format!("wrote {}", write_text(folder, "profile.json", &to_json(&found)?)?.display()));
-        for (name, pixels) in [("cost.exr", map.cost_picture()), ("blocked.exr", map.blocked_picture())] {
+        session.say(&format!("wrote {}", write_text(folder, JSON, &to_json(&found)?)?.display()));
+        for (name, pixels) in [(COST, map.cost_picture()), (BLOCKED, map.blocked_picture())] {
             session.say(&format!("wrote {}", write_map(folder, name, &map, &pixels)?.display()));
         }
         let page = page(&found, &tables, &picture, &map);
-        session.say(&format!("wrote {}", write_text(folder, "index.html", &page)?.display()));
+        session.say(&format!("wrote {}", write_text(folder, PAGE, &page)?.display()));
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use super::Failure;
 use super::cli::RenderArgs;
 use super::config::print_plan;
 use super::environment::Environment;
-use crate::render::{Observer, RenderRequest, RenderStats, Stop, job};
+use crate::render::{JobError, Observer, RenderRequest, RenderStats, Stop, job};
 use std::path::PathBuf;
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
@@ -17,8 +17,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if !args.quiet {
         summarise(&finished.stats, &finished.written);
     }
-    if let Some(failure) = finished.failure {
-        return Err(failure.into());
+    if let Some(failure) = last_failure(finished.failures) {
+        return Err(failure);
     }
     if finished.stop == Stop::Interrupted {
         return Err(Failure::Interrupted);
@@ -29,10 +29,19 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Prints all failures but the last, which decides the exit code.
+fn last_failure(failures: Vec<JobError>) -> Option<Failure> {
+    let mut failures = failures.into_iter().map(Failure::from);
+    let last = failures.next_back();
+    failures.for_each(|failure| failure.print());
+    last
+}
+
 /// The first two steps of the pipeline alone.
 fn print_config(request: &RenderRequest, environment: &Environment) -> Result<(), Failure> {
     request.check_files()?;
     let mut loaded = job::load(&request.scene, environment.runtime())?;
+    request.check_scene_files(&loaded.desc)?;
     let plan = job::resolve(request, &mut loaded)?;
     environment.console.diagnostics(&loaded.diagnostics);
     print_plan(request, &plan);

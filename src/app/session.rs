@@ -7,8 +7,9 @@ use crate::integrators::REGISTRY;
 use crate::measure::parse_methods;
 use crate::measure::reference::{Reference, ReferenceError, ReferenceTask};
 use crate::prepared::PreparedScene;
+use crate::render::files::write_or_rescue;
 use crate::render::method::find_integrator;
-use crate::render::{Budget, JobError, Method, MethodRequest, job};
+use crate::render::{Budget, JobError, Method, MethodRequest, OutputFiles, job};
 use crate::scene::{Diagnostics, SceneDesc};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -21,6 +22,8 @@ pub(crate) struct Session<'a> {
     pub args: &'a MeasureArgs,
     pub methods: Vec<MethodRequest>,
     pub environment: Environment,
+    /// Files that the command writes.
+    outputs: OutputFiles,
 }
 
 /// A prepared scene with the methods that can render it.
@@ -34,12 +37,19 @@ pub(crate) struct SceneMethods {
 }
 
 impl<'a> Session<'a> {
-    pub fn new(args: &'a MeasureArgs) -> Result<Session<'a>, Failure> {
+    /// A session of a command that reads `inputs` and writes `outputs`, which are checked before anything is done.
+    pub fn new<'b>(
+        args: &'a MeasureArgs,
+        outputs: OutputFiles,
+        inputs: impl IntoIterator<Item = &'b Path>,
+    ) -> Result<Session<'a>, Failure> {
+        outputs.check_inputs(inputs)?;
+        outputs.check()?;
         let all = || REGISTRY.iter().map(|s| s.name).collect::<Vec<_>>().join(",");
         let methods = methods(args, &args.integrators.clone().unwrap_or_else(all))?;
         let environment = Environment::new(args.threads, args.quiet)?;
         environment.console.catch_ctrl_c();
-        let session = Session { args, methods, environment };
+        let session = Session { args, methods, environment, outputs };
         // Once for all scenes.
         for method in &session.methods {
             method.renamed()?.iter().for_each(|renamed| session.say(&format!("note: {renamed}")));
@@ -51,6 +61,7 @@ impl<'a> Session<'a> {
     pub fn prepare(&self, path: &Path, references: Option<&ReferenceArgs>) -> Result<SceneMethods, Failure> {
         let runtime = self.environment.runtime();
         let loaded = job::load(&self.args.scene_request(path), runtime)?;
+        self.outputs.check_inputs(loaded.desc.files.iter().map(PathBuf::as_path))?;
         let methods = self.methods.iter().map(|m| resolve(m, &loaded.desc)).collect::<Result<Vec<_>, _>>()?;
         let reference_method = match references.and_then(|r| r.reference_integrator.as_ref()) {
             Some(text) => Some(resolve(&self.one_method(text)?, &loaded.desc)?),
@@ -145,8 +156,11 @@ pub(crate) fn write_text(folder: &Path, name: &str, text: &str) -> Result<PathBu
     let path = folder.join(name);
     let io = |e: std::io::Error| Failure::Io(format!("{}: {e}", path.display()));
     std::fs::create_dir_all(folder).map_err(io)?;
-    crate::image::atomic_write(&path, |w| w.write_all(text.as_bytes())).map_err(io)?;
-    Ok(path.clone())
+    write_or_rescue(&path, |path| {
+        crate::image::atomic_write(path, |w| w.write_all(text.as_bytes()))
+            .map_err(|e| format!("{}: {e}", path.display()))
+    })?;
+    Ok(path)
 }
 
 pub(crate) fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {

@@ -4,9 +4,9 @@
 //! against the length of the file before anything is allocated, and no input makes this module panic.
 
 use super::buffer::{Image, Pixels, srgb_to_linear};
-use super::{exr_in, netpbm};
+use super::{exr_in, netpbm, read_regular};
 use image::{DynamicImage, ImageFormat};
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// The meaning of the numbers in a file.
@@ -99,17 +99,7 @@ pub fn read_image(path: &Path, encoding: Encoding) -> Result<Image, ImageError> 
 }
 
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ImageFault> {
-    let file = std::fs::File::open(path)?;
-    let metadata = file.metadata()?;
-    if !metadata.is_file() {
-        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file").into());
-    }
-    let mut bytes = Vec::new();
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "longer than 4 GiB").into());
-    }
-    Ok(bytes)
+    Ok(read_regular(path, MAX_BYTES)?)
 }
 
 /// Decodes a picture held in memory; `is_tga` says what to make of bytes that no other format claims.

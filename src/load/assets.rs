@@ -138,6 +138,7 @@ impl Assets {
             // One at a time to a thread: a mesh being read is no larger than it ends up.
             || jobs.par_iter().with_max_len(1).map(|(source, options, _)| source.load(*options)).collect::<Vec<_>>(),
         );
+        jobs.iter().filter_map(|(source, ..)| source.path()).for_each(|path| report.opened(path));
         self.add_images(images, scene, report);
         scene.meshes.reserve(meshes.len());
         for (mesh, (source, _, span)) in meshes.into_iter().zip(jobs) {
@@ -180,6 +181,7 @@ impl Assets {
 
     fn add_images(self, images: Vec<Result<Image, ImageError>>, scene: &mut SceneDesc, report: &mut Report) {
         for (image, (path, _, span)) in images.into_iter().zip(self.images) {
+            report.opened(&path);
             let image = image.unwrap_or_else(|e| {
                 let message = format!("cannot read the picture `{}`: {e}", path.display());
                 if self.strict {

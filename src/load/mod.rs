@@ -100,6 +100,8 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<(SceneDesc, Diag
     };
     if let Some(scene) = &mut scene {
         scene.path = path.to_path_buf();
+        report.opened(path);
+        scene.files = report.take_files();
         if ending != "xml" && !options.definitions.is_empty() {
             report.push(Diagnostic::warning(
                 "load::unused-definition",

@@ -8,11 +8,11 @@
 //! `cross_check` hold the two readers against each other, and list where and why they differ.
 
 use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
+use crate::image::open_regular;
 use crate::math::Rgb;
 use crate::scene::MeshDesc;
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -59,7 +59,7 @@ pub(super) struct Library {
 
 /// Reads an OBJ file as one mesh.
 pub(super) fn read_obj(path: &Path, options: MeshOptions) -> Result<LoadedMesh, MeshError> {
-    let file = parse(BufReader::new(File::open(path)?))?;
+    let file = parse(BufReader::new(open_regular(path)?.0))?;
     let mut mesh = mesh_of(&file, &file.triangles);
     mesh::finish(&mut mesh, options);
     mesh.name = path.display().to_string();

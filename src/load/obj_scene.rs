@@ -7,6 +7,7 @@ use super::obj::{self, Library, MaterialUse, ObjFile};
 use super::obj_material::{self, Map, Mtl};
 use super::report::Report;
 use super::{LoadOptions, framing, ply};
+use crate::image::{MAX_TEXT_BYTES, open_regular, read_regular};
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, Source, nearest};
 use crate::scene::{
@@ -16,7 +17,6 @@ use crate::scene::{
 };
 use glam::DMat4;
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
@@ -44,7 +44,7 @@ pub(super) fn load_ply(path: &Path, options: &LoadOptions, report: &mut Report) 
 
 /// Reads an OBJ file and its materials.
 pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) -> Option<SceneDesc> {
-    let file = File::open(path).map_err(MeshError::from).and_then(|f| obj::parse(BufReader::new(f)));
+    let file = open_regular(path).map_err(MeshError::from).and_then(|(f, _)| obj::parse(BufReader::new(f)));
     let file = file.map_err(|e| unreadable(path, &e, report)).ok()?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut materials: HashMap<String, (Mtl, Arc<Source>)> = HashMap::new();
@@ -117,7 +117,7 @@ fn read_library(
     into: &mut HashMap<String, (Mtl, Arc<Source>)>,
     report: &mut Report,
 ) {
-    let text = match std::fs::read(path) {
+    let text = match read_regular(path, MAX_TEXT_BYTES) {
         Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
         Err(e) => {
             let message =
@@ -126,6 +126,7 @@ fn read_library(
             return;
         }
     };
+    report.opened(path);
     let source = Arc::new(Source { path: path.to_path_buf(), text });
     // Reading from memory does not fail; a library without materials is like a missing one.
     let (materials, complaints) = obj_material::parse(source.text.as_bytes()).unwrap_or_default();

@@ -3,6 +3,7 @@
 use crate::scene::Severity;
 use crate::scene::diag::{Diagnostic, Diagnostics};
 use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// More errors than this help nobody.
@@ -16,6 +17,8 @@ pub(super) struct Report {
     io: bool,
     /// Messages that have a place, by code, text, file and offset.
     seen: HashSet<(&'static str, String, usize, usize)>,
+    /// Files that were opened.
+    files: Vec<PathBuf>,
 }
 
 impl Report {
@@ -45,6 +48,16 @@ impl Report {
     pub(super) fn push_io(&mut self, d: Diagnostic) {
         self.io |= d.severity == Severity::Error;
         self.push(d);
+    }
+
+    /// Remembers a file that the scene is read from.
+    pub(super) fn opened(&mut self, path: &Path) {
+        self.files.push(path.to_owned());
+    }
+
+    /// Files that were remembered, in the order of reading.
+    pub(super) fn take_files(&mut self) -> Vec<PathBuf> {
+        std::mem::take(&mut self.files)
     }
 
     pub(super) fn has_errors(&self) -> bool {

@@ -6,6 +6,7 @@
 //! end the offsets of all meshes (u32 in version 3, u64 in version 4) and their number as u32. All little endian.
 
 use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
+use crate::image::open_regular;
 use crate::math::Rgb;
 use crate::scene::MeshDesc;
 use flate2::read::ZlibDecoder;
@@ -25,8 +26,7 @@ const MAX_COMPRESSION: u64 = 1032;
 
 /// Reads mesh number `index` of a file.
 pub(super) fn read_serialized(path: &Path, index: u32, options: MeshOptions) -> Result<LoadedMesh, MeshError> {
-    let mut file = File::open(path)?;
-    let size = file.metadata()?.len();
+    let (mut file, size) = open_regular(path)?;
     let (offset, end, version) = find(&mut file, size, index)?;
     file.seek(SeekFrom::Start(offset + 4))?;
     let compressed = end.saturating_sub(offset + 4);

@@ -9,7 +9,7 @@
 use super::scene_hash::scene_hash;
 use super::{Estimator, Plan};
 use crate::film::{Film, Pyramid};
-use crate::image::atomic_write;
+use crate::image::{atomic_write, read_regular};
 use crate::prepared::PreparedScene;
 use serde::{Deserialize, Serialize};
 use std::io::{BufWriter, Write};
@@ -21,6 +21,8 @@ const NAME: &str = "lightsieve-checkpoint-";
 const VERSION: u32 = 4;
 /// Bytes at the beginning of a file that are searched for [`NAME`]: version 2 had it behind a bracket and a key.
 const HEAD: usize = 64;
+/// Longest file that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 38;
 /// Bytes of the checksum.
 const CHECKSUM: usize = 4;
 
@@ -166,7 +168,8 @@ impl RenderIdentity {
     /// # Errors
     /// If it is not, or is damaged.
     pub fn load(&self, path: &Path) -> Result<Vec<SavedEstimator>, CheckpointError> {
-        let data = std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
+        let data =
+            read_regular(path, MAX_BYTES).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
         let found = decode(&data).map_err(|reason| CheckpointError::Format { path: path.to_owned(), reason })?;
         if let Some(difference) = self.difference(&found.identity) {
             return Err(CheckpointError::Other { path: path.to_owned(), difference });

@@ -23,6 +23,7 @@ use std::path::PathBuf;
 pub fn render(request: &RenderRequest, runtime: Runtime) -> Result<Finished, JobError> {
     request.check_files()?;
     let mut loaded = load(&request.scene, runtime)?;
+    request.check_scene_files(&loaded.desc)?;
     let plan = resolve(request, &mut loaded)?;
     let prepared = prepare(loaded, &request.prepare, runtime)?;
     prepared.check_method(&plan.method, runtime);

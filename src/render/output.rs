@@ -1,12 +1,13 @@
 //! The finish step: pictures with layers and metadata, the pyramid of techniques, and statistics as files.
 
+use super::files::{OutputFiles, is_same_file, write_or_rescue};
 use super::stats::Clock;
 use super::{JobError, OutputRequest, Plan, PreparedJob, RenderRequest, RenderStats, Rendered, Stop, aov};
 use crate::film::pyramid::PyramidLayer;
 use crate::film::{Film, Pyramid};
 use crate::image::{Layer, OutputFormat, Picture, atomic_write, write_picture};
 use crate::math::Rgb;
-use std::fs::{File, OpenOptions};
+use crate::scene::SceneDesc;
 use std::path::{Path, PathBuf};
 
 /// End of a render.
@@ -17,46 +18,58 @@ pub struct Finished {
     pub written: Vec<PathBuf>,
     /// Reason for the end of the iterations.
     pub stop: Stop,
-    /// The first failure to write a file or a checkpoint; one file that cannot be written does not cost the others.
-    pub failure: Option<JobError>,
+    /// Failures to write a file or a checkpoint; one file that cannot be written does not cost the others.
+    pub failures: Vec<JobError>,
 }
 
 /// Name and value of an entry in the header of a picture.
 type Metadata = Vec<(String, String)>;
 
+/// Files of a pyramid in its folder.
+const PYRAMID_RAW: &str = "raw.exr";
+const PYRAMID_WEIGHTED: &str = "weighted.exr";
+const PYRAMID_SHEET: &str = "sheet.png";
+
 impl RenderRequest {
-    /// Checks the names of all files that are written at the end, so that no hours of rendering are lost.
+    /// Checks the names of all files that are written at the end, so that no hours of rendering are lost: each can be
+    /// written, they are different, and none is the scene file or the checkpoint to go on from.
     ///
     /// # Errors
-    /// If a picture's format is not known, or a file cannot be written.
+    /// If a picture's format is not known, an output is another output or an input, or a file cannot be written.
     pub fn check_files(&self) -> Result<(), JobError> {
         for path in &self.outputs.pictures {
             OutputFormat::of(path).map_err(JobError::input)?;
         }
-        for path in self.outputs.pictures.iter().chain(&self.outputs.stats).chain(&self.checkpoint) {
-            check_writable(path)?;
-        }
-        Ok(())
+        let outputs = self.output_files();
+        let saved = self.checkpoint_file();
+        let resumed = self.resume.as_deref().filter(|resume| !saved.is_some_and(|saved| is_same_file(saved, resume)));
+        outputs.check_inputs([self.scene.file.as_path()].into_iter().chain(resumed))?;
+        outputs.check()
     }
-}
 
-/// Checks that a file can be written. Nothing is changed: an existing file is opened only (unless it is a pipe, whose
-/// reader would notice), and one that does not exist is tried out under another name.
-fn check_writable(path: &Path) -> Result<(), JobError> {
-    let refused = |e: std::io::Error| JobError::File(format!("{}: cannot be written: {e}", path.display()));
-    if let Ok(existing) = path.metadata() {
-        if !existing.is_file() && !existing.is_dir() {
-            return Ok(());
+    /// Checks that no output is a file that the scene was read from.
+    ///
+    /// # Errors
+    /// If one is.
+    pub fn check_scene_files(&self, desc: &SceneDesc) -> Result<(), JobError> {
+        self.output_files().check_inputs(desc.files.iter().map(PathBuf::as_path))
+    }
+
+    /// The file that checkpoints are saved to.
+    pub fn checkpoint_file(&self) -> Option<&Path> {
+        self.checkpoint.as_deref()
+    }
+
+    fn output_files(&self) -> OutputFiles {
+        let mut files = OutputFiles::default();
+        self.outputs.pictures.iter().for_each(|path| files.add("-o", path));
+        self.outputs.stats.iter().for_each(|path| files.add("--stats", path));
+        self.checkpoint_file().into_iter().for_each(|path| files.add("--checkpoint", path));
+        if let Some(pyramid) = &self.outputs.pyramid {
+            files.add_folder("--pyramid", &pyramid.folder, &[PYRAMID_RAW, PYRAMID_WEIGHTED, PYRAMID_SHEET]);
         }
-        return OpenOptions::new().write(true).open(path).map(drop).map_err(refused);
+        files
     }
-    let folder =
-        path.parent().filter(|p| !p.as_os_str().is_empty()).map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    if !folder.is_dir() {
-        return Err(JobError::File(format!("{}: the folder does not exist", path.display())));
-    }
-    let trial = folder.join(format!(".lightsieve-{}.trial", std::process::id()));
-    File::create(&trial).and_then(|_| std::fs::remove_file(&trial)).map_err(refused)
 }
 
 /// Writes everything that the request names, the statistics last. Runs on the current thread pool.
@@ -75,8 +88,8 @@ pub(super) fn write_all(prepared: &PreparedJob, plan: &Plan, rendered: Rendered,
             let layers = aov::layers(&prepared.scene, &rendered.film, plan.seed, &outputs.aovs);
             let picture = picture(&rendered.film, layers, metadata.clone());
             for path in &outputs.pictures {
-                let result = write_picture(path, &picture, outputs.exposure);
-                keep(result.map(|()| vec![path.clone()]).map_err(JobError::file));
+                let result = write_or_rescue(path, |path| write_picture(path, &picture, outputs.exposure));
+                keep(result.map(|()| vec![path.clone()]));
             }
         }
         if let (Some(pyramid), Some(found)) = (&outputs.pyramid, rendered.pyramid()) {
@@ -90,8 +103,7 @@ pub(super) fn write_all(prepared: &PreparedJob, plan: &Plan, rendered: Rendered,
         failures.push(e);
     }
     failures.extend(rendered.checkpoint_error.map(JobError::from));
-    let failure = failures.into_iter().next();
-    Finished { stats, written, stop: rendered.outcome.stop, failure }
+    Finished { stats, written, stop: rendered.outcome.stop, failures }
 }
 
 /// A layer of red, green and blue.
@@ -118,7 +130,7 @@ fn write_pyramid(
     std::fs::create_dir_all(folder).map_err(|e| JobError::File(format!("{}: {e}", folder.display())))?;
     let [width, height] = pyramid.size();
     let mut written = vec![];
-    for (name, side) in [("raw.exr", PyramidLayer::Raw), ("weighted.exr", PyramidLayer::Weighted)] {
+    for (name, side) in [(PYRAMID_RAW, PyramidLayer::Raw), (PYRAMID_WEIGHTED, PyramidLayer::Weighted)] {
         let mut sum = vec![Rgb::BLACK; width as usize * height as usize];
         let mut layers = vec![];
         for (k, s) in pyramid.techniques() {
@@ -129,13 +141,13 @@ fn write_pyramid(
         layers.insert(0, rgb_layer("", &sum));
         let path = folder.join(name);
         let picture = Picture { width, height, layers, metadata: metadata.clone() };
-        write_picture(&path, &picture, outputs.exposure).map_err(JobError::file)?;
+        write_or_rescue(&path, |path| write_picture(path, &picture, outputs.exposure))?;
         written.push(path);
     }
     let (width, height, sheet) = pyramid.sheet();
-    let path = folder.join("sheet.png");
+    let path = folder.join(PYRAMID_SHEET);
     let picture = Picture { width, height, layers: vec![rgb_layer("", &sheet)], metadata: vec![] };
-    write_picture(&path, &picture, outputs.exposure).map_err(JobError::file)?;
+    write_or_rescue(&path, |path| write_picture(path, &picture, outputs.exposure))?;
     written.push(path);
     Ok(written)
 }
@@ -164,6 +176,8 @@ fn metadata(prepared: &PreparedJob, plan: &Plan, stats: &RenderStats) -> Metadat
 
 fn write_json(path: &Path, stats: &RenderStats) -> Result<(), JobError> {
     let json = serde_json::to_string_pretty(stats).map_err(JobError::file)?;
-    atomic_write(path, |w| w.write_all(json.as_bytes()).and_then(|()| w.write_all(b"\n")))
-        .map_err(|e| JobError::File(format!("{}: {e}", path.display())))
+    write_or_rescue(path, |path| {
+        atomic_write(path, |w| w.write_all(json.as_bytes()).and_then(|()| w.write_all(b"\n")))
+            .map_err(|e| format!("{}: {e}", path.display()))
+    })
 }

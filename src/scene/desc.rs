@@ -40,6 +40,8 @@ id_type!(/// Index into [`SceneDesc::groups`].
 pub struct SceneDesc {
     /// The file it came from.
     pub path: PathBuf,
+    /// Every file that the scene was read from: scene files, includes, meshes, materials, tables and pictures.
+    pub files: Vec<PathBuf>,
     /// Cameras, at least one when valid; the first is rendered.
     pub sensors: Vec<SensorDesc>,
     /// Settings of the render that the file proposes; the command line overrides them.

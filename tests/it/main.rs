@@ -12,6 +12,7 @@ mod furnace;
 mod image_metrics;
 mod images;
 mod measure;
+mod outputs;
 mod rays;
 mod regression;
 mod resampling;

@@ -6,6 +6,7 @@ use super::props::Props;
 use super::spectrum::{self, Purpose};
 use super::values::{number, numbers};
 use crate::image::buffer::srgb_to_linear;
+use crate::image::read_regular_text;
 use crate::math::Rgb;
 use crate::scene::diag::Diagnostic;
 use crate::scene::{ColorDesc, ScalarDesc};
@@ -114,7 +115,7 @@ impl Builder<'_> {
     fn spectrum_file(&self, node: &Node, purpose: Purpose) -> Option<Rgb> {
         let attr = node.attr("filename")?;
         let path = super::document::find_file(&self.tree.folders, &attr.value);
-        let text = match std::fs::read_to_string(&path) {
+        let text = match read_regular_text(&path) {
             Ok(text) => text,
             Err(e) => {
                 let d = Diagnostic::error("load::io", format!("cannot read `{}`: {e}", path.display()))
@@ -123,6 +124,7 @@ impl Builder<'_> {
                 return None;
             }
         };
+        self.report.borrow_mut().opened(&path);
         let mut samples = Vec::new();
         for (i, line) in text.lines().enumerate() {
             let line = line.split('#').next().unwrap_or("").trim();

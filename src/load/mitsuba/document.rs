@@ -1,5 +1,6 @@
 //! XML text into a tree: spans, includes, `<default>` and `-D` parameters, aliases, ids, renaming of old spellings.
 
+use crate::image::{MAX_TEXT_BYTES, read_regular};
 use crate::load::report::Report;
 use crate::scene::Span;
 use crate::scene::diag::{Diagnostic, Source, nearest};
@@ -133,7 +134,7 @@ struct File<'a> {
 impl Loader<'_> {
     /// Reads a file and returns its root element.
     fn file(&mut self, path: &Path, from: Option<&Span>) -> Option<usize> {
-        let text = match std::fs::read(path) {
+        let text = match read_regular(path, MAX_TEXT_BYTES) {
             Ok(bytes) => bytes,
             Err(e) => {
                 let d = Diagnostic::error("load::io", format!("cannot read `{}`: {e}", path.display()));
@@ -141,6 +142,7 @@ impl Loader<'_> {
                 return None;
             }
         };
+        self.report.opened(path);
         let text = String::from_utf8(text).unwrap_or_else(|e| {
             let d = Diagnostic::warning(
                 "scene::not-utf8",

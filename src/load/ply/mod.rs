@@ -15,16 +15,15 @@ mod build;
 mod header;
 
 use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
+use crate::image::open_regular;
 use build::Builder;
 use header::{Format, Header};
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 /// Reads a PLY file.
 pub(super) fn read_ply(path: &Path, options: MeshOptions) -> Result<LoadedMesh, MeshError> {
-    let file = File::open(path)?;
-    let size = file.metadata()?.len();
+    let (file, size) = open_regular(path)?;
     let mut loaded = parse_ply(file, size, options.face_normals)?;
     mesh::finish(&mut loaded.mesh, options);
     loaded.mesh.name = path.display().to_string();
