@@ -1,4 +1,4 @@
-//! Picture files into memory: PNG, JPEG, TGA, Radiance HDR, OpenEXR, PFM, PGM and PPM.
+//! Picture files into memory: PNG, JPEG, BMP, WebP, TGA, Radiance HDR, OpenEXR, PFM, PGM and PPM.
 //!
 //! The format is recognised by the first bytes, not by the ending (only TGA has no such bytes). Sizes are checked
 //! against the length of the file before anything is allocated, and no input makes this module panic.
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// The meaning of the numbers in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Encoding {
-    /// sRGB in integer files (PNG, JPEG, TGA, PGM, PPM), linear in float files (EXR, HDR, PFM).
+    /// sRGB in integer files (PNG, JPEG, BMP, WebP, TGA, PGM, PPM), linear in float files (EXR, HDR, PFM).
     #[default]
     Auto,
     /// sRGB transfer (alpha excepted).
@@ -39,7 +39,7 @@ pub enum ImageFault {
     #[error("cannot be read: {0}")]
     Io(#[from] std::io::Error),
     /// Not a picture, or of a kind not known here.
-    #[error("not a picture in a known format (known: png, jpg, tga, hdr, exr, pfm, pgm, ppm)")]
+    #[error("not a picture in a known format (known: png, jpg, bmp, webp, tga, hdr, exr, pfm, pgm, ppm)")]
     UnknownFormat,
     /// The contents contradict themselves or end too early.
     #[error("the {format} data is damaged: {reason}")]
@@ -121,6 +121,10 @@ fn decode_by_magic(bytes: &[u8], is_tga: bool, encoding: Encoding) -> Result<Ima
             return Err(ImageFault::damaged("JPEG", "the file ends before the picture does"));
         }
         decode_common(bytes, ImageFormat::Jpeg, "JPEG", encoding)
+    } else if is(b"BM") {
+        decode_common(bytes, ImageFormat::Bmp, "BMP", encoding)
+    } else if is(b"RIFF") && bytes.get(8..12) == Some(b"WEBP".as_slice()) {
+        decode_common(bytes, ImageFormat::WebP, "WebP", encoding)
     } else if is(b"#?") {
         decode_common(bytes, ImageFormat::Hdr, "HDR", encoding)
     } else if is(b"\x76\x2f\x31\x01") {
