@@ -1,6 +1,6 @@
 //! Files that a scene names: remembered while the text is read, each once, and decoded in parallel afterwards.
 
-use super::mesh::{LoadedMesh, MeshError, MeshOptions};
+use super::mesh::{Dropped, LoadedMesh, MeshError, MeshOptions};
 use super::primitives::Primitive;
 use super::report::Report;
 use super::{obj, ply, serialized};
@@ -82,7 +82,7 @@ impl MeshSource {
             MeshSource::Ply(path) => ply::read_ply(path, options),
             MeshSource::Obj(path) => obj::read_obj(path, options),
             MeshSource::Serialized(path, index) => serialized::read_serialized(path, *index, options),
-            MeshSource::Primitive(p) => Ok(LoadedMesh { mesh: p.mesh(options.mirrored), skipped_faces: 0 }),
+            MeshSource::Primitive(p) => Ok(LoadedMesh { mesh: p.mesh(options.mirrored), dropped: Dropped::default() }),
         }
     }
 }
@@ -145,13 +145,8 @@ impl Assets {
             let path = source.path().cloned().unwrap_or_default();
             scene.meshes.push(match mesh {
                 Ok(loaded) => {
-                    if loaded.skipped_faces > 0 {
-                        let message = format!(
-                            "`{}`: {} faces of fewer than three corners are left out",
-                            path.display(),
-                            loaded.skipped_faces
-                        );
-                        report.push(Diagnostic::warning("load::mesh", message).at(span));
+                    for message in loaded.dropped.messages(&path) {
+                        report.push(Diagnostic::warning("load::mesh", message).at(span.clone()));
                     }
                     loaded.mesh
                 }

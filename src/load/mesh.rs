@@ -3,6 +3,7 @@
 use super::normals;
 use crate::scene::MeshDesc;
 use std::fmt;
+use std::path::Path;
 
 /// How to read a mesh, after the parameters of Mitsuba's mesh shapes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -17,12 +18,47 @@ pub(super) struct MeshOptions {
     pub mirrored: bool,
 }
 
-/// A mesh as read, with what was dropped on the way.
+/// A mesh as read.
 #[derive(Debug)]
 pub(super) struct LoadedMesh {
     pub mesh: MeshDesc,
+    pub dropped: Dropped,
+}
+
+/// Parts of a mesh file that are not in the mesh.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Dropped {
     /// Faces of fewer than three corners.
-    pub skipped_faces: u64,
+    pub faces: u64,
+    /// Statements that the reader does not know: how many, the first of them, and its line.
+    pub statements: Option<UnknownStatements>,
+}
+
+/// Statements that the reader does not know.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct UnknownStatements {
+    pub count: u64,
+    /// The first one's keyword.
+    pub first: String,
+    /// The first one's line, from 1.
+    pub line: u64,
+}
+
+impl Dropped {
+    /// A sentence for each kind of part that was dropped.
+    pub(super) fn messages(&self, path: &Path) -> Vec<String> {
+        let path = path.display();
+        let mut out = Vec::new();
+        if self.faces > 0 {
+            out.push(format!("`{path}`: {} faces of fewer than three corners are left out", self.faces));
+        }
+        if let Some(UnknownStatements { count, first, line }) = &self.statements {
+            out.push(format!(
+                "`{path}`: {count} unknown statements are skipped; the first is `{first}` in line {line}"
+            ));
+        }
+        out
+    }
 }
 
 /// Where in a mesh file something is wrong.

@@ -7,7 +7,8 @@
 //! lines, cuts comments, completes corners and drops polylines would be this reader once more. Instead the tests in
 //! `cross_check` hold the two readers against each other, and list where and why they differ.
 
-use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
+use super::mesh::{self, Dropped, LoadedMesh, MeshError, MeshOptions, Place, UnknownStatements};
+use super::polygon::{self, MAX_CONCAVE_CORNERS};
 use crate::image::open_regular;
 use crate::math::Rgb;
 use crate::scene::MeshDesc;
@@ -34,8 +35,7 @@ pub(super) struct ObjFile {
     pub triangles: Vec<[Corner; 3]>,
     pub materials: Vec<MaterialUse>,
     pub libraries: Vec<Library>,
-    /// Faces of fewer than three corners.
-    pub skipped_faces: u64,
+    pub dropped: Dropped,
 }
 
 /// A `usemtl` statement.
@@ -63,7 +63,7 @@ pub(super) fn read_obj(path: &Path, options: MeshOptions) -> Result<LoadedMesh, 
     let mut mesh = mesh_of(&file, &file.triangles);
     mesh::finish(&mut mesh, options);
     mesh.name = path.display().to_string();
-    Ok(LoadedMesh { mesh, skipped_faces: file.skipped_faces })
+    Ok(LoadedMesh { mesh, dropped: file.dropped })
 }
 
 /// Makes a mesh of some triangles of a file: one vertex for each combination of indices that occurs.
@@ -105,6 +105,12 @@ pub(super) fn parse(reader: impl BufRead) -> Result<ObjFile, MeshError> {
     for_each_line(reader, |number, line| {
         statement(&mut file, &mut corners, number, line).map_err(|message| MeshError::new(Place::Line(number), message))
     })?;
+    if let Some(UnknownStatements { first, line, .. }) = &file.dropped.statements
+        && file.triangles.is_empty()
+        && file.dropped.faces == 0
+    {
+        return Err(MeshError::new(Place::Line(*line), format!("unknown statement `{first}`: not an OBJ file?")));
+    }
     if file.colors.len() != file.positions.len() {
         file.colors = Vec::new();
     }
@@ -179,12 +185,7 @@ fn statement(file: &mut ObjFile, corners: &mut Vec<Corner>, number: u64, line: &
             for word in rest.split_ascii_whitespace() {
                 corners.push(corner(file, word)?);
             }
-            if corners.len() < 3 {
-                file.skipped_faces += 1;
-            }
-            for pair in corners.get(1..).unwrap_or(&[]).windows(2) {
-                file.triangles.push([corners[0], pair[0], pair[1]]);
-            }
+            face(file, corners)?;
         }
         "usemtl" => {
             let (name, first_triangle) = (rest.trim().to_owned(), file.triangles.len());
@@ -197,11 +198,28 @@ fn statement(file: &mut ObjFile, corners: &mut Vec<Corner>, number: u64, line: &
         | "c_interp" | "d_interp" | "usemap" | "maplib" => {}
         "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim" | "hole" | "scrv" | "sp"
         | "end" | "con" => {}
-        other => {
-            return Err(format!(
-                "unknown statement `{}`: not an OBJ file?",
-                other.chars().take(40).collect::<String>()
-            ));
+        other => match &mut file.dropped.statements {
+            Some(unknown) => unknown.count += 1,
+            none => {
+                let first = other.chars().take(40).collect();
+                *none = Some(UnknownStatements { count: 1, first, line: number });
+            }
+        },
+    }
+    Ok(())
+}
+
+/// Adds a face as triangles.
+fn face(file: &mut ObjFile, corners: &[Corner]) -> Result<(), String> {
+    match *corners {
+        [] | [_] | [_, _] => file.dropped.faces += 1,
+        [a, b, c] => file.triangles.push([a, b, c]),
+        _ => {
+            let points: Vec<Vec3> = corners.iter().map(|c| file.positions[c[0] as usize]).collect();
+            polygon::triangulate(&points, |t| file.triangles.push(t.map(|i| corners[i]))).map_err(|_| {
+                let n = corners.len();
+                format!("a polygon of {n} corners that is not convex: at most {MAX_CONCAVE_CORNERS} are supported")
+            })?;
         }
     }
     Ok(())

@@ -16,6 +16,8 @@ pub(super) struct Map {
     /// `-o u v`.
     pub offset: [f32; 2],
     pub clamp: bool,
+    /// `-bm`: multiplies heights.
+    pub bump_multiplier: f32,
 }
 
 /// A material as the file has it.
@@ -39,6 +41,10 @@ pub(super) struct Mtl {
     pub map_specular: Option<Map>,
     pub map_emission: Option<Map>,
     pub map_dissolve: Option<Map>,
+    /// Heights (in the units of the model).
+    pub map_bump: Option<Map>,
+    /// Normals in tangent space, an extension.
+    pub map_normal: Option<Map>,
 }
 
 impl Mtl {
@@ -93,13 +99,12 @@ fn property(mtl: &mut Mtl, keyword: &str, rest: &str) -> Result<(), String> {
         "map_Ks" => mtl.map_specular = Some(map(rest)?),
         "map_Ke" => mtl.map_emission = Some(map(rest)?),
         "map_d" => mtl.map_dissolve = Some(map(rest)?),
-        "map_Bump" | "map_bump" | "bump" | "norm" => {
-            return Err("bump and normal maps of OBJ materials are not supported: ignored".into());
-        }
+        "map_Bump" | "map_bump" | "bump" => mtl.map_bump = Some(map(rest)?),
+        "norm" | "map_Kn" => mtl.map_normal = Some(map(rest)?),
         // Ambient terms, and what newer exporters add without a common meaning.
         "Ka" | "Km" | "map_Ka" | "map_Ns" | "map_Tr" | "disp" | "decal" | "refl" | "sharpness" | "map_aat" | "Pr"
         | "Pm" | "Ps" | "Pc" | "Pcr" | "aniso" | "anisor" | "map_Pr" | "map_Pm" | "map_Ps" | "map_Ke_factor"
-        | "map_refl" | "Kt" | "map_Disp" | "map_Kn" => {}
+        | "map_refl" | "Kt" | "map_Disp" => {}
         other => return Err(format!("unknown property `{other}`")),
     }
     Ok(())
@@ -125,7 +130,7 @@ fn color(text: &str) -> Result<Rgb, String> {
 
 /// Options with their numbers, then the file's name, which may hold blanks.
 fn map(text: &str) -> Result<Map, String> {
-    let mut out = Map { file: String::new(), scale: [1.0; 2], offset: [0.0; 2], clamp: false };
+    let mut out = Map { file: String::new(), scale: [1.0; 2], offset: [0.0; 2], clamp: false, bump_multiplier: 1.0 };
     let mut rest = text.trim();
     while rest.starts_with('-') {
         let (option, after) =
@@ -155,14 +160,14 @@ fn map(text: &str) -> Result<Map, String> {
         match option {
             "-s" => out.scale = pair(1.0),
             "-o" => out.offset = pair(0.0),
+            "-bm" => out.bump_multiplier = pair(1.0)[0],
             _ => {}
         }
     }
     if rest.is_empty() {
         return Err("a texture without a file name".into());
     }
-    // Backslashes separate folders in files from Windows.
-    out.file = rest.trim_matches('"').replace('\\', "/");
+    out.file = rest.trim_matches('"').to_owned();
     Ok(out)
 }
 
@@ -180,8 +185,17 @@ mod tests {
         assert_eq!(all[0].diffuse, Some(Rgb::new(1.0, 0.5, 0.0)));
         assert_eq!((all[0].opacity(), all[1].opacity()), (0.75, 1.0));
         let map = all[0].map_diffuse.as_ref().unwrap();
-        assert_eq!((map.file.as_str(), map.scale, map.clamp), ("tex tures/a b.png", [2.0, 3.0], true));
+        assert_eq!((map.file.as_str(), map.scale, map.clamp), ("tex tures\\a b.png", [2.0, 3.0], true));
         assert_eq!(all[1].emission, Some(Rgb::grey(3.0)));
+    }
+
+    #[test]
+    fn reads_bump_and_normal_maps() {
+        let (all, complaints) = parse("newmtl a\nmap_Bump -bm 0.25 a.png\nnorm b.png\n".as_bytes()).unwrap();
+        assert!(complaints.is_empty(), "{complaints:?}");
+        let (bump, normal) = (all[0].map_bump.as_ref().unwrap(), all[0].map_normal.as_ref().unwrap());
+        assert_eq!((bump.file.as_str(), bump.bump_multiplier), ("a.png", 0.25));
+        assert_eq!((normal.file.as_str(), normal.bump_multiplier), ("b.png", 1.0));
     }
 
     #[test]

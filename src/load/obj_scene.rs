@@ -1,40 +1,35 @@
 //! A model without a scene around it: OBJ with its MTL materials, or a lone PLY. The camera comes from the options, the
 //! light from emitting materials or, if there are none, from a sky of constant radiance.
 
-use super::assets::{Assets, ImageUse};
-use super::mesh::{self, LoadedMesh, MeshError, MeshOptions};
+use super::assets::Assets;
+use super::mesh::{self, Dropped, LoadedMesh, MeshError, MeshOptions};
 use super::obj::{self, Library, MaterialUse, ObjFile};
-use super::obj_material::{self, Map, Mtl};
+use super::obj_material::{self, Mtl};
+use super::paths::{locate, locate_or_warn};
 use super::report::Report;
 use super::{LoadOptions, framing, ply};
 use crate::image::{MAX_TEXT_BYTES, open_regular, read_regular};
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, Source, nearest};
 use crate::scene::{
-    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, ComplexIor, ConductorParams, DielectricParams, DiffuseParams,
-    EmitterDesc, EmitterKind, MeshId, PhongParams, ScalarDesc, SceneDesc, ShapeDesc, Span, TextureDesc, TextureFilter,
-    TextureId, WrapMode,
+    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, DiffuseParams, EmitterDesc, EmitterKind, MeshId, SceneDesc,
+    ShapeDesc, Span,
 };
 use glam::DMat4;
+use materials::{BumpMap, Origin};
 use std::collections::HashMap;
 use std::io::BufReader;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Refractive index of a transparent material that does not say it.
-const GLASS: f32 = 1.5;
-/// From this Phong exponent on a highlight is as sharp as a reflection.
-const MIRROR_EXPONENT: f32 = 1e4;
+mod materials;
 
 /// Reads a PLY file as a scene of one grey object.
 pub(super) fn load_ply(path: &Path, options: &LoadOptions, report: &mut Report) -> Option<SceneDesc> {
-    let LoadedMesh { mesh, skipped_faces } =
+    let LoadedMesh { mesh, dropped } =
         ply::read_ply(path, MeshOptions::default()).map_err(|e| unreadable(path, &e, report)).ok()?;
-    if skipped_faces > 0 {
-        let message = format!("`{}`: {skipped_faces} faces of fewer than three corners are left out", path.display());
-        report.push(Diagnostic::warning("load::mesh", message));
-    }
+    warn_of_dropped(&dropped, path, report);
     let mut model = Model::default();
     let bsdf = model.grey();
     model.scene.meshes.push(mesh);
@@ -46,20 +41,17 @@ pub(super) fn load_ply(path: &Path, options: &LoadOptions, report: &mut Report) 
 pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) -> Option<SceneDesc> {
     let file = open_regular(path).map_err(MeshError::from).and_then(|(f, _)| obj::parse(BufReader::new(f)));
     let file = file.map_err(|e| unreadable(path, &e, report)).ok()?;
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(path);
     let mut materials: HashMap<String, (Mtl, Arc<Source>)> = HashMap::new();
     for library in &file.libraries {
-        for name in library_files(folder, library) {
-            read_library(&folder.join(name), path, library.line, &mut materials, report);
+        for name in library_files(&folder, library) {
+            let library_path = locate_or_warn(std::slice::from_ref(&folder), &name, None, report);
+            read_library(&library_path, path, library.line, &mut materials, report);
         }
     }
 
     let mut model = Model { assets: Assets::new(options.strict), ..Model::default() };
-    if file.skipped_faces > 0 {
-        let message =
-            format!("`{}`: {} faces of fewer than three corners are left out", path.display(), file.skipped_faces);
-        report.push(Diagnostic::warning("load::mesh", message));
-    }
+    warn_of_dropped(&file.dropped, path, report);
     for MaterialGroup { name, line, triangles } in by_material(&file) {
         let triangles = triangles.iter().flat_map(|range| &file.triangles[range.clone()]);
         let mut mesh = obj::mesh_of(&file, triangles);
@@ -79,7 +71,10 @@ pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) 
         }
         let span = found.map(|(mtl, source)| line_span(source, mtl.line));
         let (bsdf, emission) = match found {
-            Some((mtl, _)) => model.material(mtl, folder, span.clone()),
+            Some((mtl, source)) => {
+                let folders = [folder_of(&source.path), folder.clone()];
+                model.material(mtl, &mut Origin { folders: &folders, span: span.clone(), report })
+            }
             None => (model.grey(), None),
         };
         model.scene.meshes.push(mesh);
@@ -90,6 +85,16 @@ pub(super) fn load_obj(path: &Path, options: &LoadOptions, report: &mut Report) 
     Some(model.finish(options, report))
 }
 
+fn folder_of(path: &Path) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).to_path_buf()
+}
+
+fn warn_of_dropped(dropped: &Dropped, path: &Path, report: &mut Report) {
+    for message in dropped.messages(path) {
+        report.push(Diagnostic::warning("load::mesh", message));
+    }
+}
+
 fn unreadable(path: &Path, e: &MeshError, report: &mut Report) {
     let d = Diagnostic::error("load::mesh", format!("cannot read `{}`: {e}", path.display()));
     if matches!(e, MeshError::Io(_)) { report.push_io(d) } else { report.push(d) }
@@ -98,15 +103,11 @@ fn unreadable(path: &Path, e: &MeshError, report: &mut Report) {
 /// Files that a `mtllib` statement names, relative to `folder`. The format separates several files by blanks, while
 /// many exporters write one name with blanks in it; a file that is there decides.
 fn library_files(folder: &Path, library: &Library) -> Vec<String> {
-    // Backslashes separate folders in files from Windows.
-    let names = library.names.replace('\\', "/");
+    let names = library.names.clone();
     // The first of several that has a material wins: it is read last.
     let words: Vec<String> = names.split_ascii_whitespace().rev().map(str::to_owned).collect();
-    if !folder.join(&names).exists() && words.iter().any(|word| folder.join(word).exists()) {
-        words
-    } else {
-        vec![names]
-    }
+    let exists = |name: &str| locate(std::slice::from_ref(&folder.to_path_buf()), name).path.exists();
+    if !exists(&names) && words.iter().any(|word| exists(word)) { words } else { vec![names] }
 }
 
 /// Reads an MTL file; one that is missing costs the colours only.
@@ -179,6 +180,8 @@ pub(super) fn by_material(file: &ObjFile) -> Vec<MaterialGroup> {
 struct Model {
     scene: SceneDesc,
     assets: Assets,
+    /// Materials with a bump map, which may turn out to hold normals.
+    bump_maps: Vec<BumpMap>,
 }
 
 impl Model {
@@ -208,6 +211,7 @@ impl Model {
     /// Decodes textures, adds camera and, if need be, light.
     fn finish(mut self, options: &LoadOptions, report: &mut Report) -> SceneDesc {
         self.assets.decode_images(&mut self.scene, report);
+        materials::replace_bump_maps_of_normals(&mut self.scene, &self.bump_maps, report);
         if self.scene.shapes.iter().all(|s| s.emission.is_none()) && !self.scene.shapes.is_empty() {
             report.push(Diagnostic::note(
                 "load::added-sky",
@@ -220,112 +224,6 @@ impl Model {
             Err(message) => report.push(Diagnostic::error("load::camera", message)),
         }
         self.scene
-    }
-
-    /// The BSDF of a material: mirrors and glass by the illumination model, else a diffuse base with a Phong
-    /// highlight; seen from both sides unless it transmits.
-    fn material(&mut self, mtl: &Mtl, folder: &Path, span: Option<Span>) -> (BsdfId, Option<AreaEmission>) {
-        let emission = self.color(mtl.map_emission.as_ref(), mtl.emission.unwrap_or(Rgb::BLACK), folder, span.clone());
-        let emits = emission != ColorDesc::Constant(Rgb::BLACK);
-        let emission = emits.then_some(AreaEmission { radiance: emission, span: span.clone() });
-        let name = Some(mtl.name.as_str());
-        let specular = mtl.specular.unwrap_or(Rgb::BLACK);
-        let dissolve = mtl.opacity();
-        let refracts = mtl.ior.is_some_and(|i| i > 1.0);
-        if matches!(mtl.illumination, Some(4 | 6 | 7 | 9)) || (dissolve < 1.0 && refracts && mtl.map_dissolve.is_none())
-        {
-            // Black stands for "not filled in" in what many exporters write.
-            let tint = mtl.transmission.filter(|t| !t.is_black()).unwrap_or(Rgb::WHITE);
-            let glass = DielectricParams {
-                eta: mtl.ior.filter(|i| *i > 1.0).unwrap_or(GLASS),
-                specular_reflectance: ColorDesc::Constant(Rgb::WHITE),
-                specular_transmittance: ColorDesc::Constant(tint.map(|v| v.clamp(0.0, 1.0))),
-            };
-            return (self.bsdf(name, glass.into(), span), emission);
-        }
-        let diffuse = self.color(mtl.map_diffuse.as_ref(), mtl.diffuse.unwrap_or(Rgb::grey(0.5)), folder, span.clone());
-        let shininess = mtl.shininess.unwrap_or(0.0);
-        let mirror =
-            matches!(mtl.illumination, Some(3 | 5 | 8)) || (shininess >= MIRROR_EXPONENT && !specular.is_black());
-        let kind = if mirror {
-            let tint =
-                if specular.is_black() { diffuse } else { ColorDesc::Constant(specular.map(|v| v.clamp(0.0, 1.0))) };
-            let ior = ComplexIor { eta: ColorDesc::Constant(Rgb::BLACK), k: ColorDesc::Constant(Rgb::WHITE) };
-            ConductorParams { ior, specular_reflectance: tint }.into()
-        } else if shininess > 1.0 && (!specular.is_black() || mtl.map_specular.is_some()) {
-            self.glossy(mtl, diffuse, specular, shininess, folder, span.clone())
-        } else {
-            DiffuseParams { reflectance: clamped(diffuse) }.into()
-        };
-        let inner = self.bsdf(name, kind, span.clone());
-        let mut outer = self.bsdf(name, BsdfKind::TwoSided { front: inner, back: inner }, span.clone());
-        let opacity = match &mtl.map_dissolve {
-            Some(map) => Some(ScalarDesc::Texture(self.texture(map, ImageUse::Data, folder, span.clone()))),
-            None => (dissolve < 1.0).then_some(ScalarDesc::Constant(dissolve)),
-        };
-        if let Some(opacity) = opacity {
-            outer = self.bsdf(name, BsdfKind::Mask { nested: outer, opacity }, span);
-        }
-        (outer, emission)
-    }
-
-    /// Diffuse and specular part together reflect no more than what arrives.
-    fn glossy(
-        &mut self,
-        mtl: &Mtl,
-        diffuse: ColorDesc,
-        specular: Rgb,
-        exponent: f32,
-        folder: &Path,
-        span: Option<Span>,
-    ) -> BsdfKind {
-        let specular = self.color(mtl.map_specular.as_ref(), specular, folder, span);
-        let brightest = |c: ColorDesc| match c {
-            ColorDesc::Constant(c) => c.max_component(),
-            ColorDesc::Texture(_) => 0.0,
-        };
-        let sum = brightest(diffuse) + brightest(specular);
-        let scale = if sum > 1.0 { 1.0 / sum } else { 1.0 };
-        let scaled = |c: ColorDesc| match c {
-            ColorDesc::Constant(c) => ColorDesc::Constant(c * scale),
-            texture => texture,
-        };
-        let highlight = PhongParams {
-            exponent: ScalarDesc::Constant(exponent),
-            specular_reflectance: scaled(specular),
-            diffuse_reflectance: scaled(diffuse),
-        };
-        highlight.into()
-    }
-
-    fn color(&mut self, map: Option<&Map>, constant: Rgb, folder: &Path, span: Option<Span>) -> ColorDesc {
-        match map {
-            Some(map) => ColorDesc::Texture(self.texture(map, ImageUse::Color, folder, span)),
-            None => ColorDesc::Constant(constant),
-        }
-    }
-
-    fn texture(&mut self, map: &Map, usage: ImageUse, folder: &Path, span: Option<Span>) -> TextureId {
-        let image = self.assets.image(folder.join(&map.file), usage, span);
-        let ([su, sv], [ou, ov]) = (map.scale, map.offset);
-        // The file's v runs up, ours down: 1 − (s (1 − v) + o) = s v + (1 − s − o).
-        let to_uv = [[su, 0.0, ou], [0.0, sv, 1.0 - sv - ov]];
-        let wrap = if map.clamp { WrapMode::Clamp } else { WrapMode::Repeat };
-        self.scene.textures.push(TextureDesc::Bitmap {
-            image,
-            to_uv,
-            filter: TextureFilter::Bilinear,
-            wrap,
-            scale: 1.0,
-        });
-        TextureId((self.scene.textures.len() - 1) as u32)
-    }
-}
-
-fn clamped(c: ColorDesc) -> ColorDesc {
-    match c {
-        ColorDesc::Constant(c) => ColorDesc::Constant(c.map(|v| v.clamp(0.0, 1.0))),
-        texture => texture,
     }
 }
 

@@ -5,7 +5,7 @@
 //! [version 4: name, zero], u64 vertices, u64 triangles, positions, [normals], [uvs], [colours], indices; at the file's
 //! end the offsets of all meshes (u32 in version 3, u64 in version 4) and their number as u32. All little endian.
 
-use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
+use super::mesh::{self, Dropped, LoadedMesh, MeshError, MeshOptions, Place};
 use crate::image::open_regular;
 use crate::math::Rgb;
 use crate::scene::MeshDesc;
@@ -38,7 +38,7 @@ pub(super) fn read_serialized(path: &Path, index: u32, options: MeshOptions) -> 
     let (mut mesh, face_normals) = inflated.mesh(version)?;
     mesh::finish(&mut mesh, MeshOptions { face_normals: options.face_normals || face_normals, ..options });
     mesh.name = format!("{} #{index}", path.display());
-    Ok(LoadedMesh { mesh, skipped_faces: 0 })
+    Ok(LoadedMesh { mesh, dropped: Dropped::default() })
 }
 
 /// Where a mesh begins and ends, and the format's version.

@@ -7,6 +7,7 @@ use super::spectrum::{self, Purpose};
 use super::values::{number, numbers};
 use crate::image::buffer::srgb_to_linear;
 use crate::image::read_regular_text;
+use crate::load::paths::locate_or_warn;
 use crate::math::Rgb;
 use crate::scene::diag::Diagnostic;
 use crate::scene::{ColorDesc, ScalarDesc};
@@ -114,7 +115,7 @@ impl Builder<'_> {
     /// A file of lines `wavelength value`; `#` begins a comment.
     fn spectrum_file(&self, node: &Node, purpose: Purpose) -> Option<Rgb> {
         let attr = node.attr("filename")?;
-        let path = super::document::find_file(&self.tree.folders, &attr.value);
+        let path = locate_or_warn(&self.tree.folders, &attr.value, Some(&attr.span), &mut self.report.borrow_mut());
         let text = match read_regular_text(&path) {
             Ok(text) => text,
             Err(e) => {

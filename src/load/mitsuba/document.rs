@@ -1,6 +1,7 @@
 //! XML text into a tree: spans, includes, `<default>` and `-D` parameters, aliases, ids, renaming of old spellings.
 
 use crate::image::{MAX_TEXT_BYTES, read_regular};
+use crate::load::paths::locate_or_warn;
 use crate::load::report::Report;
 use crate::scene::Span;
 use crate::scene::diag::{Diagnostic, Source, nearest};
@@ -288,7 +289,7 @@ impl Loader<'_> {
         };
         let name_span = Span { source: file.source.clone(), range: attr.range_value() };
         let name = self.substitute(attr.value(), &name_span);
-        let path = find_file(&self.tree.folders, &name);
+        let path = locate_or_warn(&self.tree.folders, &name, Some(&name_span), self.report);
         if let Some(root) = self.file(&path, Some(&name_span)) {
             // A whole scene gives its contents; a lone element gives itself.
             if self.tree.nodes[root].tag == "scene" {
@@ -369,15 +370,6 @@ impl Loader<'_> {
             }
         }
     }
-}
-
-/// Where a file named in the scene is: relative names are looked for in the scene's folders in turn.
-pub(super) fn find_file(folders: &[PathBuf], name: &str) -> PathBuf {
-    let candidates = folders.iter().map(|f| f.join(name));
-    candidates
-        .clone()
-        .find(|p| p.exists())
-        .unwrap_or_else(|| candidates.into_iter().next().unwrap_or_else(|| name.into()))
 }
 
 /// The start tag of an element, without what it encloses.

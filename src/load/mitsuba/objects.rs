@@ -1,8 +1,9 @@
 //! The builder: what all plugin kinds share, above all references and what has been built already.
 
-use super::document::{Node, Tree, find_file};
+use super::document::{Node, Tree};
 use super::props::Props;
 use crate::load::assets::Assets;
+use crate::load::paths::locate_or_warn;
 use crate::load::report::Report;
 use crate::scene::diag::{Diagnostic, nearest};
 use crate::scene::{BsdfId, GroupId, SceneDesc, Span, TextureId};
@@ -124,6 +125,7 @@ impl<'t> Builder<'t> {
         }
         let text = props.string(name)?;
         let span = props.get(name)?.span_of("value");
-        Some((find_file(&self.tree.folders, text), span))
+        let path = locate_or_warn(&self.tree.folders, text, Some(&span), &mut self.report.borrow_mut());
+        Some((path, span))
     }
 }

@@ -1,5 +1,5 @@
 //! The crate `tobj` as a second reader of OBJ and MTL: both must give the same triangles, texture coordinates, normals,
-//! colours and materials wherever both accept a file. Where they differ by intention, a test states what either does.
+//! colours and materials wherever both accept a file, except that `tobj` makes fans of all polygons. Where they differ by intention, a test states what either does.
 
 use super::super::obj_material::{self, Mtl};
 use super::super::obj_scene::by_material;
@@ -136,7 +136,7 @@ fn corners_of_every_form_agree() {
         ("f 1 2 3\n", 1),
         ("f 1 2 3 4\n", 2),
         ("f -4 -3 -2 -1", 2),
-        ("f 1 2 3 4 3 2 1\nf 4 3 2 1 2\n", 8),
+        ("f 1 2 3 4 1 2 3\nf 4 3 2 1\n", 7),
         ("s 1\nf\t1  2 3 \r\ns off\r\nf 2 3\t4\r\n\r\n", 2),
         ("p 1\nf 1\nf 1 2\nl 1 2\nf 1 2 3\n", 1),
     ] {

@@ -55,6 +55,33 @@ fn conventions_are_mitsubas() {
 }
 
 #[test]
+fn unknown_statements_are_skipped_and_counted() {
+    let f = read(&format!("{QUAD}\nfoo 1 2\nv 2 2 2\nbar\nfoo\nf 1 2 5\n")).unwrap();
+    assert_eq!((f.triangles.len(), f.positions.len()), (3, 5));
+    let unknown = UnknownStatements { count: 3, first: "foo".to_owned(), line: 14 };
+    assert_eq!(f.dropped, Dropped { faces: 0, statements: Some(unknown) });
+    let said = f.dropped.messages(Path::new("a.obj"));
+    assert_eq!(said, ["`a.obj`: 3 unknown statements are skipped; the first is `foo` in line 14"]);
+}
+
+/// An L of six corners, from each of them: the fan of two of them leaves it.
+#[test]
+fn concave_polygons_are_covered_once() {
+    let vertices = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\n";
+    for first in 0..6 {
+        let corners: String = (0..6).map(|i| format!(" {}", (first + i) % 6 + 1)).collect();
+        let f = read(&format!("{vertices}f{corners}\n")).unwrap();
+        let area = |t: &[Corner; 3]| {
+            let [a, b, c] = t.map(|c| f.positions[c[0] as usize]);
+            (b - a).cross(c - a).z * 0.5
+        };
+        let areas: Vec<f32> = f.triangles.iter().map(area).collect();
+        assert!(areas.len() == 4 && areas.iter().all(|&a| a > 0.0), "{corners}: {areas:?}");
+        assert_eq!(areas.iter().sum::<f32>(), 3.0, "{corners}");
+    }
+}
+
+#[test]
 fn mistakes_have_their_line() {
     for (text, says) in [
         ("v 0 0\n", "line 1: expected 3 numbers, found 2"),
@@ -66,7 +93,9 @@ fn mistakes_have_their_line() {
         ("v 0 0 0\nf 1/1 1 1\n", "line 2: there is no texture coordinate 1"),
         ("v 0 0 0\nf 1/1/1/1 1 1\n", "line 2: there is no texture coordinate"),
         ("v 0 0 0\nf a 1 1\n", "line 2: `a` is not a corner"),
+        // Nothing in it is of this format.
         ("\u{0}PNG\n", "line 1: unknown statement"),
+        ("v 0 0 0\n\nsolid cube\nsolid 2\n", "line 3: unknown statement `solid`: not an OBJ file?"),
     ] {
         let e = read(text).unwrap_err();
         assert!(e.starts_with(says), "{text}: {e}");

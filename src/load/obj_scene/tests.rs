@@ -1,7 +1,6 @@
 use super::*;
 use crate::load::load_scene;
-use crate::scene::BsdfModel;
-use crate::scene::Severity;
+use crate::scene::{BsdfModel, ConductorParams, DielectricParams, PhongParams, ScalarDesc, Severity, TextureDesc};
 use glam::DVec3;
 
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nusemtl wall\nf 1 2 3\nusemtl glass\nf 1 3 4\nusemtl wall\nf 2 3 4\nusemtl lamp\nf 1/1 2/1 4/1\nusemtl mirror\nf 1 2 4\nusemtl shiny\nf 1 2 4\n";
@@ -123,4 +122,71 @@ fn a_lone_ply_is_a_scene() {
     let e = load_scene(&path, &LoadOptions::default()).unwrap_err();
     assert!(!e.io && e.to_string().contains("names vertex 3"), "{e}");
     assert!(load_scene(&folder.path().join("none.obj"), &LoadOptions::default()).unwrap_err().io);
+}
+
+/// A folder with an OBJ file, a library in a folder of its own, and pictures of one pixel.
+fn folder_with(mtl: &str, pictures: &[(&str, [u8; 3])]) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("lib/maps")).unwrap();
+    let path = folder.path().join("a.obj");
+    std::fs::write(&path, "mtllib lib\\m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl a\nf 1 2 3\n").unwrap();
+    std::fs::write(folder.path().join("lib/m.mtl"), mtl).unwrap();
+    for (name, color) in pictures {
+        image::RgbImage::from_pixel(1, 1, image::Rgb(*color)).save(folder.path().join(name)).unwrap();
+    }
+    (folder, path)
+}
+
+#[test]
+fn textures_are_looked_for_beside_the_mtl_and_then_beside_the_obj() {
+    let (red, green) = ([255, 0, 0], [0, 255, 0]);
+    for (name, pictures, want) in [
+        ("k.png", vec![("lib/k.png", red), ("k.png", green)], Rgb::new(1.0, 0.0, 0.0)),
+        ("k.png", vec![("k.png", green)], Rgb::new(0.0, 1.0, 0.0)),
+        ("maps\\k.png", vec![("lib/maps/k.png", green)], Rgb::new(0.0, 1.0, 0.0)),
+        ("C:\\Users\\me\\k.png", vec![("lib/k.png", red)], Rgb::new(1.0, 0.0, 0.0)),
+    ] {
+        let (_folder, path) = folder_with(&format!("newmtl a\nmap_Kd {name}\n"), &pictures);
+        let (scene, found) = load_scene(&path, &LoadOptions::default()).unwrap();
+        assert_eq!(scene.images[0].image.rgb(0, 0), want, "{name}");
+        let codes: Vec<_> = found.list.iter().map(|d| d.code).filter(|code| *code != "load::added-sky").collect();
+        let moved = name.starts_with('C');
+        assert_eq!(codes, if moved { vec!["load::other-folder"] } else { vec![] }, "{name}");
+    }
+}
+
+#[test]
+fn bump_and_normal_maps_tilt_the_material_under_both_sides() {
+    let grey = [128, 128, 128];
+    let tilted = [170, 140, 230];
+    for (mtl, pictures, is_normal, said) in [
+        ("map_Bump -bm 0.5 b.png", [("lib/b.png", grey)], false, false),
+        ("norm b.png", [("lib/b.png", tilted)], true, false),
+        // Exporters write normals behind either keyword.
+        ("bump b.png", [("lib/b.png", tilted)], true, true),
+    ] {
+        let (_folder, path) = folder_with(&format!("newmtl a\n{mtl}\n"), &pictures);
+        let (scene, found) = load_scene(&path, &LoadOptions::default()).unwrap();
+        let BsdfKind::TwoSided { front, back } = scene.bsdfs[scene.shapes[0].bsdf.unwrap().index()].kind else {
+            panic!()
+        };
+        assert_eq!(front, back);
+        let (nested, texture) = match scene.bsdfs[front.index()].kind {
+            BsdfKind::BumpMap { nested, height, scale: 0.5 } if !is_normal => (nested, height),
+            BsdfKind::NormalMap { nested, normals } if is_normal => (nested, normals),
+            ref other => panic!("{mtl}: {other:?}"),
+        };
+        assert!(matches!(scene.bsdfs[nested.index()].kind, BsdfKind::Model(BsdfModel::Diffuse(_))));
+        // Plain numbers, as the format means them.
+        let TextureDesc::Bitmap { image, .. } = scene.textures[texture.index()] else { panic!() };
+        assert!(matches!(scene.images[image.index()].image.pixels, crate::image::Pixels::Linear8(_)));
+        assert_eq!(found.list.iter().any(|d| d.code == "load::normals-as-bump"), said, "{mtl}");
+    }
+}
+
+#[test]
+fn unknown_statements_are_a_warning() {
+    let (scene, found) = load(&OBJ.replace("vt 0 0", "vt 0 0\nfoo 1"), Some(MTL), &LoadOptions::default()).unwrap();
+    assert_eq!(scene.shapes.len(), 5);
+    assert!(found.list.iter().any(|d| d.code == "load::mesh" && d.message.contains("first is `foo` in line 7")));
 }

@@ -51,7 +51,7 @@ pub(super) fn read_body<R: Read + Send>(
                         }
                         Ok(())
                     })?;
-                    builder.face(face, &corners);
+                    builder.face(face, &corners)?;
                     corners.clear();
                 }
             }

@@ -189,7 +189,7 @@ pub(super) fn read_body<O: Order, R: Read + Send>(
         match element.name.as_str() {
             "vertex" => read_vertices::<O, R>(element, stream, builder)?,
             "face" => read_faces::<O, R>(element, stream, builder)?,
-            _ => each_row::<O, R>(element, stream, |_, _| {})?,
+            _ => each_row::<O, R>(element, stream, |_, _| Ok(()))?,
         }
     }
     Ok(())
@@ -215,6 +215,7 @@ fn read_vertices<O: Order, R: Read + Send>(
                 let last = builder.mesh.positions.len() - 1;
                 first_bad = first_bad.or(builder.first_broken_vertex(last));
             }
+            Ok(())
         })?;
         return first_bad.map_or(Ok(()), |v| Err(MeshError::new(Place::File, format!("vertex {v} is not finite"))));
     };
@@ -317,7 +318,7 @@ fn read_faces<O: Order, R: Read + Send>(
             stream.need(1 + 4 * count, "face")?;
             corners.clear();
             corners.extend((0..count).map(|i| O::u32(bytes(stream.available(), 1 + 4 * i))));
-            builder.face(face, &corners);
+            builder.face(face, &corners)?;
             stream.begin += 1 + 4 * count;
             face += 1;
         }
@@ -332,9 +333,10 @@ fn read_faces<O: Order, R: Read + Send>(
             corners.extend(data.chunks_exact(item.size()).map(|v| index::<O>(item, v, 0)));
         }
         if property == last {
-            builder.face(face, &corners);
+            builder.face(face, &corners)?;
             face += 1;
         }
+        Ok(())
     })
 }
 
@@ -348,14 +350,14 @@ enum Row<'a> {
 fn each_row<O: Order, R: Read + Send>(
     element: &Element,
     stream: &mut Stream<R>,
-    mut each: impl FnMut(usize, Row<'_>),
+    mut each: impl FnMut(usize, Row<'_>) -> Result<(), MeshError>,
 ) -> Result<(), MeshError> {
     for _ in 0..element.count {
         for (i, property) in element.properties.iter().enumerate() {
             match property.kind {
                 Kind::One(kind) => {
                     stream.need(kind.size(), &element.name)?;
-                    each(i, Row::One(scalar::<O>(kind, stream.available(), 0)));
+                    each(i, Row::One(scalar::<O>(kind, stream.available(), 0)))?;
                     stream.begin += kind.size();
                 }
                 Kind::List { count, item } => {
@@ -368,7 +370,7 @@ fn each_row<O: Order, R: Read + Send>(
                     let length = (length as u64).saturating_mul(item.size() as u64);
                     let length = usize::try_from(length).unwrap_or(usize::MAX);
                     stream.need(length, &element.name)?;
-                    each(i, Row::List(item, &stream.available()[..length]));
+                    each(i, Row::List(item, &stream.available()[..length]))?;
                     stream.begin += length;
                 }
             }

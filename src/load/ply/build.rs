@@ -2,7 +2,8 @@
 
 use super::header::{Element, Kind, Scalar};
 use crate::image::buffer::srgb_to_linear;
-use crate::load::mesh::{LoadedMesh, MeshError, Place};
+use crate::load::mesh::{Dropped, LoadedMesh, MeshError, Place};
+use crate::load::polygon::{self, MAX_CONCAVE_CORNERS};
 use crate::math::Rgb;
 use crate::scene::MeshDesc;
 use glam::{Vec2, Vec3};
@@ -51,12 +52,23 @@ pub(super) fn index_property(element: &Element) -> Result<usize, MeshError> {
     })
 }
 
+/// A face of more than three corners, cut into triangles when all vertices are known: they may follow the faces.
+#[derive(Debug)]
+struct Polygon {
+    /// Number of the face in the file.
+    face: u64,
+    /// Where its triangles stand in the mesh.
+    first_triangle: usize,
+    corners: Vec<u32>,
+}
+
 /// A mesh in the making.
 #[derive(Debug, Default)]
 pub(super) struct Builder {
     pub mesh: MeshDesc,
     pub normals_unwanted: bool,
     skipped_faces: u64,
+    polygons: Vec<Polygon>,
     /// Largest index seen, and the face that had it.
     largest: Option<(u32, u64)>,
 }
@@ -108,16 +120,40 @@ impl Builder {
         bad(first, &self.mesh.positions).or(uv)
     }
 
-    /// Adds face number `face` as a fan of triangles.
-    pub(super) fn face(&mut self, face: u64, corners: &[u32]) {
+    /// Adds face number `face`.
+    pub(super) fn face(&mut self, face: u64, corners: &[u32]) -> Result<(), MeshError> {
         if corners.len() < 3 {
             self.skipped_faces += 1;
-            return;
+            return Ok(());
         }
+        let first_triangle = self.mesh.triangles.len();
         for pair in corners[1..].windows(2) {
             self.mesh.triangles.push([corners[0], pair[0], pair[1]]);
         }
-        self.note_largest(corners.iter().copied().max().unwrap_or(0), face);
+        let largest = corners.iter().copied().max().unwrap_or(0);
+        self.note_largest(largest, face);
+        if corners.len() > 3 {
+            if (largest as usize) < self.mesh.positions.len() {
+                return self.cut(face, first_triangle, corners);
+            }
+            self.polygons.push(Polygon { face, first_triangle, corners: corners.to_vec() });
+        }
+        Ok(())
+    }
+
+    /// Puts the right triangles in the place of a polygon's fan. All its vertices must be there.
+    fn cut(&mut self, face: u64, first_triangle: usize, corners: &[u32]) -> Result<(), MeshError> {
+        let points: Vec<Vec3> = corners.iter().map(|&i| self.mesh.positions[i as usize]).collect();
+        let mut places = self.mesh.triangles[first_triangle..].iter_mut();
+        let cut = polygon::triangulate(&points, |t| {
+            if let Some(place) = places.next() {
+                *place = t.map(|i| corners[i]);
+            }
+        });
+        cut.map_err(|_| {
+            let message = format!("face {face} is a polygon of {} corners that is not convex", corners.len());
+            MeshError::new(Place::File, format!("{message}: at most {MAX_CONCAVE_CORNERS} are supported"))
+        })
     }
 
     /// Remembers the largest index; [`Builder::finish`] compares it with the number of vertices, which may come after
@@ -140,8 +176,12 @@ impl Builder {
                 format!("face {face} names vertex {index}, but there are {vertices} vertices"),
             ));
         }
+        for polygon in std::mem::take(&mut self.polygons) {
+            self.cut(polygon.face, polygon.first_triangle, &polygon.corners)?;
+        }
         // Polygons grow the list by doubling: give back what is too much.
         self.mesh.triangles.shrink_to_fit();
-        Ok(LoadedMesh { mesh: self.mesh, skipped_faces: self.skipped_faces })
+        let dropped = Dropped { faces: self.skipped_faces, statements: None };
+        Ok(LoadedMesh { mesh: self.mesh, dropped })
     }
 }

@@ -7,7 +7,7 @@
 //!
 //! Known vertex properties: `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`, `texture_s texture_t`), `r g
 //! b` (or `red green blue`; eight-bit colours are taken as sRGB). Faces: `vertex_indices` or `vertex_index`; polygons
-//! become fans.
+//! are cut into triangles.
 
 mod ascii;
 mod binary;

@@ -15,7 +15,7 @@ const ASCII: &str = "ply\nformat ascii 1.0\ncomment two faces\nelement vertex 5\
     property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n4 0 1 2 3\n3 0 1 4\n";
 
 #[test]
-fn ascii_polygons_become_fans() {
+fn convex_polygons_become_fans() {
     let m = parse(ASCII.as_bytes()).unwrap().mesh;
     assert_eq!(m.positions.len(), 5);
     assert_eq!(m.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 4]]);
@@ -199,7 +199,31 @@ fn absurd_counts_do_not_allocate() {
 #[test]
 fn faces_of_two_corners_are_left_out_and_counted() {
     let loaded = parse(ASCII.replace("3 0 1 4", "2 0 1").as_bytes()).unwrap();
-    assert_eq!((loaded.skipped_faces, loaded.mesh.triangles.len()), (1, 2));
+    assert_eq!((loaded.dropped.faces, loaded.mesh.triangles.len()), (1, 2));
+}
+
+/// A quad with a notch at corner 2: a fan from corner 0 or 1 leaves it, wherever the vertices are.
+#[test]
+fn concave_polygons_are_cut_into_triangles_inside() {
+    let rows = ["0 0 0", "2 0 0", "0.5 0.5 0", "0 2 0"];
+    let header = "ply\nformat ascii 1.0\n";
+    let vertices = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+    let faces = "element face 1\nproperty list uchar int vertex_indices\n";
+    for first in 0..4 {
+        let face: String = (0..4).map(|i| format!(" {}", (first + i) % 4)).collect();
+        for text in [
+            format!("{header}{vertices}{faces}end_header\n{}\n4{face}\n", rows.join("\n")),
+            format!("{header}{faces}{vertices}end_header\n4{face}\n{}\n", rows.join("\n")),
+        ] {
+            let mesh = parse(text.as_bytes()).unwrap().mesh;
+            let area = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+                (b - a).cross(c - a).z * 0.5
+            };
+            let areas: Vec<f32> = mesh.triangles.iter().map(area).collect();
+            assert_eq!(areas, [0.5, 0.5], "{text}");
+        }
+    }
 }
 
 #[test]

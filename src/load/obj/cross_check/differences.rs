@@ -29,7 +29,7 @@ fn mistakes_have_a_line_only_here() {
 #[test]
 fn refused_here_accepted_there() {
     for (tail, here) in [
-        // A file of another kind would be an empty scene.
+        // Without a face: a file of another kind would be an empty scene.
         ("PNG\n", "unknown statement `PNG`"),
         ("v nan 0 0\n", "`nan` is not a finite number"),
         ("v 0 inf 0\n", "`inf` is not a finite number"),
@@ -68,6 +68,23 @@ fn accepted_here_refused_there() {
     let latin = [FOUR.as_bytes(), b"g K\xf6rper\nf 1 2 3\n"].concat();
     assert_eq!(ours(&latin, MTL).unwrap().triangles.len(), 1);
     assert_eq!(theirs_twice(&latin, MTL).unwrap_err(), "read error");
+}
+
+#[test]
+fn concave_polygons_are_fans_there() {
+    // A notch at the third corner.
+    let text = b"v 0 0 0\nv 2 0 0\nv 0.5 0.5 0\nv 0 2 0\nf 2 3 4 1\n";
+    let area = |reading: &Reading| -> f32 {
+        let areas = reading.triangles.iter().map(|t| {
+            let [a, b, c] = t.vertices.map(|v| v.position);
+            (b - a).cross(c - a).length() * 0.5
+        });
+        areas.sum()
+    };
+    assert_eq!(area(&ours(text, MTL).unwrap()), 1.0);
+    for reading in theirs_twice(text, MTL).unwrap() {
+        assert_eq!(area(&reading), 3.0);
+    }
 }
 
 #[test]
@@ -167,7 +184,7 @@ fn some_properties_of_materials_remain_text_there() {
     assert!(here.transmission.is_some() && here.map_emission.is_some() && here.opacity() == 0.75);
     assert_eq!(
         here.map_diffuse.as_ref().map(|m| (m.file.as_str(), m.scale, m.clamp)),
-        Some(("a/b.png", [2.0; 2], true))
+        Some(("a\\b.png", [2.0; 2], true))
     );
     let (there, _) = tobj::load_mtl_buf(&mut text.as_slice()).unwrap();
     assert_eq!(there[0].diffuse_texture.as_deref(), Some("-s 2 2 1 -clamp on a\\b.png # wood"));
