@@ -43,7 +43,7 @@ impl Environment {
 
 /// Messages and the progress bar on standard error.
 pub(crate) struct Console {
-    /// Only errors are printed.
+    /// Only errors are printed, and what makes the picture another than the scene file asks for.
     pub quiet: bool,
     interrupt: Arc<AtomicBool>,
     ctrl_c: Once,
@@ -97,6 +97,8 @@ impl Observer for Console {
     fn diagnostics(&self, new: &Diagnostics) {
         if !self.quiet || new.has_errors() {
             report::print(new);
+        } else {
+            report::print(&new.changing_picture());
         }
     }
 

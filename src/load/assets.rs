@@ -87,11 +87,21 @@ impl MeshSource {
     }
 }
 
+/// A picture to decode.
+#[derive(Debug)]
+struct ImageJob {
+    path: PathBuf,
+    usage: ImageUse,
+    span: Option<Span>,
+    /// It lights the scene: nothing can be shown in its place.
+    is_light: bool,
+}
+
 /// Files to decode.
 #[derive(Debug, Default)]
 pub(super) struct Assets {
     strict: bool,
-    images: Vec<(PathBuf, ImageUse, Option<Span>)>,
+    images: Vec<ImageJob>,
     image_ids: HashMap<(PathBuf, ImageUse), ImageId>,
     meshes: Vec<(MeshSource, MeshOptions, Span)>,
     mesh_ids: HashMap<(MeshSource, MeshOptions), MeshId>,
@@ -106,9 +116,16 @@ impl Assets {
     /// The id that a picture will have.
     pub(super) fn image(&mut self, path: PathBuf, usage: ImageUse, span: impl Into<Option<Span>>) -> ImageId {
         *self.image_ids.entry((path.clone(), usage)).or_insert_with(|| {
-            self.images.push((path, usage, span.into()));
+            self.images.push(ImageJob { path, usage, span: span.into(), is_light: false });
             ImageId((self.images.len() - 1) as u32)
         })
+    }
+
+    /// Makes it an error if the picture cannot be read, as it lights the scene.
+    pub(super) fn require(&mut self, image: ImageId) {
+        if let Some(job) = self.images.get_mut(image.index()) {
+            job.is_light = true;
+        }
     }
 
     /// The id that a mesh will have.
@@ -171,24 +188,23 @@ impl Assets {
     }
 
     fn read_images(&self) -> Vec<Result<Image, ImageError>> {
-        self.images.par_iter().map(|(path, usage, _)| usage.read(path)).collect()
+        self.images.par_iter().map(|job| job.usage.read(&job.path)).collect()
     }
 
     fn add_images(self, images: Vec<Result<Image, ImageError>>, scene: &mut SceneDesc, report: &mut Report) {
-        for (image, (path, _, span)) in images.into_iter().zip(self.images) {
+        for (image, ImageJob { path, span, is_light, .. }) in images.into_iter().zip(self.images) {
             report.opened(&path);
             let image = image.unwrap_or_else(|e| {
                 let message = format!("cannot read the picture `{}`: {e}", path.display());
-                if self.strict {
+                if self.strict || is_light {
                     let d = Diagnostic::error("load::image", message).at(span);
                     match e.fault {
                         ImageFault::Io(_) => report.push_io(d),
                         _ => report.push(d),
                     }
                 } else {
-                    report.push(
-                        Diagnostic::warning("load::image", message).at(span).help("magenta is shown in its place"),
-                    );
+                    let d = Diagnostic::warning("load::image", message).at(span).changing_picture();
+                    report.push(d.help("magenta is shown in its place"));
                 }
                 magenta()
             });

@@ -64,12 +64,22 @@ pub struct Diagnostic {
     pub label: Option<String>,
     /// A remedy, or the consequence.
     pub help: Option<String>,
+    /// The picture will be another than the file asks for: said even where warnings are not wanted.
+    pub changes_picture: bool,
 }
 
 impl Diagnostic {
     /// An error.
     pub fn error(code: &'static str, message: impl Into<String>) -> Diagnostic {
-        Diagnostic { severity: Severity::Error, code, message: message.into(), span: None, label: None, help: None }
+        Diagnostic {
+            severity: Severity::Error,
+            code,
+            message: message.into(),
+            span: None,
+            label: None,
+            help: None,
+            changes_picture: false,
+        }
     }
 
     /// A warning.
@@ -91,6 +101,12 @@ impl Diagnostic {
     /// Adds the text shown at the place.
     pub fn label(mut self, label: impl Into<String>) -> Diagnostic {
         self.label = Some(label.into());
+        self
+    }
+
+    /// Marks a warning of a picture that is another than the file asks for.
+    pub fn changing_picture(mut self) -> Diagnostic {
+        self.changes_picture = true;
         self
     }
 
@@ -117,6 +133,11 @@ impl Diagnostics {
     /// How many of this severity.
     pub fn count(&self, severity: Severity) -> usize {
         self.list.iter().filter(|d| d.severity == severity).count()
+    }
+
+    /// The messages that tell of a picture other than the file asks for.
+    pub fn changing_picture(&self) -> Diagnostics {
+        Diagnostics { list: self.list.iter().filter(|d| d.changes_picture).cloned().collect() }
     }
 
     /// True if the scene cannot be rendered.

@@ -1,5 +1,6 @@
 //! XML text into a tree: spans, includes, `<default>` and `-D` parameters, aliases, ids, renaming of old spellings.
 
+use super::limits::Usage;
 use crate::image::{MAX_TEXT_BYTES, read_regular};
 use crate::load::paths::locate_or_warn;
 use crate::load::report::Report;
@@ -52,7 +53,7 @@ pub(super) struct Tree {
     pub folders: Vec<PathBuf>,
 }
 
-/// Deeper nesting or inclusion than this is a mistake.
+/// Elements nested deeper than this in one file are a mistake.
 const MAX_DEPTH: usize = 64;
 
 /// Elements that stand for plugins.
@@ -98,6 +99,8 @@ pub(super) fn load(path: &Path, definitions: &[(String, String)], report: &mut R
         parameters: definitions.iter().map(|(k, v)| (k.clone(), (v.clone(), false))).collect(),
         open: Vec::new(),
         aliases: Vec::new(),
+        usage: Usage::default(),
+        exceeded: false,
         report,
     };
     loader.tree.root = loader.file(path, None)?;
@@ -123,6 +126,9 @@ struct Loader<'a> {
     /// Files being read, outermost first.
     open: Vec<PathBuf>,
     aliases: Vec<(Attr, Attr)>,
+    usage: Usage,
+    /// A limit is exceeded, which has been reported: nothing more is read.
+    exceeded: bool,
     report: &'a mut Report,
 }
 
@@ -154,7 +160,7 @@ impl Loader<'_> {
         });
         let source = Arc::new(Source { path: path.to_path_buf(), text });
         let identity = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-        if self.open.contains(&identity) || self.open.len() >= MAX_DEPTH {
+        if self.open.contains(&identity) {
             let d = Diagnostic::error("scene::circular-include", format!("`{}` includes itself", path.display()));
             self.report.push(d.at(from.cloned()).label("included here again"));
             return None;
@@ -185,6 +191,13 @@ impl Loader<'_> {
         root
     }
 
+    /// Reports that the scene exceeds a limit, the first time.
+    fn exceed(&mut self, message: String, span: &Span) {
+        if !std::mem::replace(&mut self.exceeded, true) {
+            self.report.push(Diagnostic::error("scene::too-large", message).at(span.clone()));
+        }
+    }
+
     /// True for files older than version 2.
     fn version(&mut self, root: &roxmltree::Node<'_, '_>, source: &Arc<Source>) -> bool {
         let Some(attr) = root.attribute_node("version") else {
@@ -203,22 +216,12 @@ impl Loader<'_> {
 
     /// Adds an element with all it holds; `None` if it leaves nothing in the tree.
     fn element(&mut self, xml: roxmltree::Node<'_, '_>, file: &File<'_>) -> Option<usize> {
+        if self.exceeded {
+            return None;
+        }
         let span = start_tag(&xml, file.source);
         let tag = xml.tag_name().name();
-        let known = OBJECT_TAGS.iter().chain(&VALUE_TAGS).chain(&OTHER_TAGS).chain(&TRANSFORM_TAGS).copied();
-        if !known.clone().any(|k| k == tag) {
-            if tag == SUBSURFACE {
-                self.report.push(
-                    Diagnostic::warning("scene::ignored-element", "subsurface scattering is not supported: ignored")
-                        .at(span),
-                );
-            } else {
-                let mut d = Diagnostic::error("scene::unknown-element", format!("unknown element <{tag}>")).at(span);
-                if let Some(near) = nearest(tag, known) {
-                    d = d.label(format!("did you mean <{near}>?"));
-                }
-                self.report.push(d);
-            }
+        if !self.is_known(tag, &span) {
             return None;
         }
         let mut attrs = Vec::new();
@@ -256,6 +259,10 @@ impl Loader<'_> {
             }
             _ => {}
         }
+        if let Err(message) = self.usage.begin_element() {
+            self.exceed(message, &node.span);
+            return None;
+        }
         for child in xml.children().filter(roxmltree::Node::is_element) {
             if child.tag_name().name() == "include" {
                 self.include(child, file, &mut node);
@@ -263,21 +270,44 @@ impl Loader<'_> {
                 node.children.push(child);
             }
         }
+        self.usage.end_element();
         let index = self.tree.nodes.len();
-        if let Some(id) = node.attr("id")
-            && node.tag != "ref"
-            && !id.value.is_empty()
-        {
-            if let Some(&other) = self.tree.ids.get(&id.value) {
-                let line = self.tree.nodes[other].span.line_column().0;
-                let d = Diagnostic::error("scene::duplicate-id", format!("the id `{}` is taken", id.value));
-                self.report.push(d.at(id.span.clone()).label(format!("first used in line {line}")));
-            } else {
-                self.tree.ids.insert(id.value.clone(), index);
-            }
+        if node.tag != "ref" {
+            self.register_id(&node, index);
         }
         self.tree.nodes.push(node);
         Some(index)
+    }
+
+    /// Reports an element that does not exist.
+    fn is_known(&mut self, tag: &str, span: &Span) -> bool {
+        let known = OBJECT_TAGS.iter().chain(&VALUE_TAGS).chain(&OTHER_TAGS).chain(&TRANSFORM_TAGS).copied();
+        if known.clone().any(|k| k == tag) {
+            return true;
+        }
+        let d = if tag == SUBSURFACE {
+            Diagnostic::warning("scene::ignored-element", "subsurface scattering is not supported: ignored")
+        } else {
+            let d = Diagnostic::error("scene::unknown-element", format!("unknown element <{tag}>"));
+            match nearest(tag, known) {
+                Some(near) => d.label(format!("did you mean <{near}>?")),
+                None => d,
+            }
+        };
+        self.report.push(d.at(span.clone()));
+        false
+    }
+
+    /// Remembers the element `index` by its id, if it has one.
+    fn register_id(&mut self, node: &Node, index: usize) {
+        let Some(id) = node.attr("id").filter(|id| !id.value.is_empty()) else { return };
+        if let Some(&other) = self.tree.ids.get(&id.value) {
+            let line = self.tree.nodes[other].span.line_column().0;
+            let d = Diagnostic::error("scene::duplicate-id", format!("the id `{}` is taken", id.value));
+            self.report.push(d.at(id.span.clone()).label(format!("first used in line {line}")));
+        } else {
+            self.tree.ids.insert(id.value.clone(), index);
+        }
     }
 
     /// Puts the contents of an included file in the place of `<include>`.
@@ -289,6 +319,12 @@ impl Loader<'_> {
         };
         let name_span = Span { source: file.source.clone(), range: attr.range_value() };
         let name = self.substitute(attr.value(), &name_span);
+        if let Err(message) = self.usage.include(self.open.len()) {
+            self.exceed(message, &name_span);
+        }
+        if self.exceeded {
+            return;
+        }
         let path = locate_or_warn(&self.tree.folders, &name, Some(&name_span), self.report);
         if let Some(root) = self.file(&path, Some(&name_span)) {
             // A whole scene gives its contents; a lone element gives itself.
@@ -320,6 +356,9 @@ impl Loader<'_> {
 
     /// Replaces every `$name` by its value.
     fn substitute(&mut self, text: &str, span: &Span) -> String {
+        if !text.contains('$') {
+            return text.to_owned();
+        }
         let mut out = String::new();
         let mut rest = text;
         while let Some(at) = rest.find('$') {
@@ -329,7 +368,13 @@ impl Loader<'_> {
             let name = &after[..length];
             if let Some((value, used)) = self.parameters.get_mut(name) {
                 *used = true;
-                out.push_str(value);
+                match self.usage.substitute(out.len(), value.len()) {
+                    Ok(()) => out.push_str(value),
+                    Err(message) => {
+                        self.exceed(message, span);
+                        return out;
+                    }
+                }
             } else {
                 let known: Vec<&str> = self.parameters.keys().map(String::as_str).collect();
                 let mut d = Diagnostic::error(

@@ -66,11 +66,9 @@ impl Builder<'_> {
             "envmap" => {
                 let (path, span) = self.file(p, "filename")?;
                 let usage = legacy_gamma(p).unwrap_or(ImageUse::Color);
-                EmitterKind::Envmap {
-                    image: self.assets.image(path, usage, span),
-                    scale: p.float_or("scale", 1.0) as f32,
-                    to_world: to_world(p),
-                }
+                let image = self.assets.image(path, usage, span);
+                self.assets.require(image);
+                EmitterKind::Envmap { image, scale: p.float_or("scale", 1.0) as f32, to_world: to_world(p) }
             }
             "sunsky" | "sun" | "sky" => self.sun_sky(p, to_world(p)),
             _ => {

@@ -11,6 +11,7 @@ mod conductors;
 mod document;
 mod emitter;
 mod indices;
+mod limits;
 mod objects;
 mod props;
 mod sensor;

@@ -182,6 +182,7 @@ impl Builder<'_> {
             return None;
         }
         let radiance = self.color(&p, "radiance", 1.0, Emission);
+        self.require_pictures(radiance);
         p.ignore(&["sampling_weight"]);
         p.finish();
         Some(AreaEmission { radiance, span: Some(p.span()) })

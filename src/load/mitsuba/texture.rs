@@ -5,7 +5,7 @@ use super::props::Props;
 use super::spectrum::Purpose::Reflectance;
 use crate::load::assets::ImageUse;
 use crate::scene::diag::Diagnostic;
-use crate::scene::{TextureDesc, TextureFilter, TextureId, WrapMode};
+use crate::scene::{ColorDesc, TextureDesc, TextureFilter, TextureId, WrapMode};
 
 impl Builder<'_> {
     /// The texture `object`, reached from the element `from`.
@@ -65,6 +65,18 @@ impl Builder<'_> {
         }
     }
 
+    /// Makes it an error if a picture of a texture that lights the scene cannot be read.
+    pub(super) fn require_pictures(&mut self, color: ColorDesc) {
+        let ColorDesc::Texture(id) = color else { return };
+        match self.scene.textures[id.index()] {
+            TextureDesc::Bitmap { image, .. } => self.assets.require(image),
+            // Nested textures are built before the one that holds them, so that there is no circle.
+            TextureDesc::Checkerboard { color0, color1, .. } => {
+                [color0, color1].into_iter().for_each(|c| self.require_pictures(c));
+            }
+        }
+    }
+
     /// Says that a normal or bump map is decoded as sRGB where the file does not ask for it in so many words: Mitsuba's
     /// default, and mostly not what an author means.
     pub(super) fn warn_of_decoding(&self, object: usize, plugin: &str) {
@@ -110,8 +122,8 @@ impl Builder<'_> {
             TextureDesc::Checkerboard { color0, color1, .. } => {
                 for color in [color0, color1] {
                     match color {
-                        crate::scene::ColorDesc::Constant(c) => *c *= factor,
-                        crate::scene::ColorDesc::Texture(_) => {
+                        ColorDesc::Constant(c) => *c *= factor,
+                        ColorDesc::Texture(_) => {
                             p.error("scene::nested-texture", "a checkerboard of textures cannot be scaled");
                             return None;
                         }

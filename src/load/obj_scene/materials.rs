@@ -41,7 +41,14 @@ impl Model {
     /// highlight; seen from both sides unless it transmits.
     pub(super) fn material(&mut self, mtl: &Mtl, origin: &mut Origin<'_>) -> (BsdfId, Option<AreaEmission>) {
         let span = origin.span.clone();
-        let emission = self.color(mtl.map_emission.as_ref(), mtl.emission.unwrap_or(Rgb::BLACK), origin);
+        let emission = match &mtl.map_emission {
+            Some(map) => {
+                let (texture, image) = self.texture(map, ImageUse::Color, origin);
+                self.assets.require(image);
+                ColorDesc::Texture(texture)
+            }
+            None => ColorDesc::Constant(mtl.emission.unwrap_or(Rgb::BLACK)),
+        };
         let emits = emission != ColorDesc::Constant(Rgb::BLACK);
         let emission = emits.then_some(AreaEmission { radiance: emission, span: span.clone() });
         let name = Some(mtl.name.as_str());
