@@ -9,9 +9,9 @@
 //! for any machine.
 
 use super::contribution::Contribution;
-use crate::film::{Film, TILE};
+use crate::film::{Film, FilmTile, TILE};
 use crate::mis::allocation::{LightSharing, Probe, RegionVariance, WeightedContribution};
-use crate::mis::{AllocationCosts, EfficiencyEstimator, SampleAllocation};
+use crate::mis::{AllocationCosts, EfficiencyEstimator, ProbedErrors, SampleAllocation};
 use crate::ray::{RayKind, RayStats};
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +48,30 @@ impl RayCosts {
     pub const SHARED_SUBPATHS: RayCosts = RayCosts { eye: 1.0, light: 1.2, connection: 1.0 };
 }
 
+/// Costs of rays, with the work that belongs to them, in an iteration of a method whose weights count connections. The
+/// unit is the cost of a ray of path tracing. Fitted to the times of seven scenes, within about a third.
+mod iteration_costs {
+    /// Rays of eye sub-paths and of next event.
+    pub const EYE: f64 = 1.7;
+    /// Rays of light sub-paths and to the lens.
+    pub const LIGHT: f64 = 1.5;
+    /// Connections with their weights.
+    pub const CONNECTION: f64 = 1.2;
+    /// Shadow rays of weights.
+    pub const WEIGHT: f64 = 0.9;
+    /// Shadow rays of pmfs.
+    pub const PMF: f64 = 0.4;
+}
+
+/// Error and cost of an iteration at the allocation that was decided.
+#[derive(Clone, Debug)]
+pub struct ProbedEfficiency {
+    /// Errors.
+    pub errors: ProbedErrors,
+    /// Cost, in rays of path tracing.
+    pub cost: f64,
+}
+
 /// The samples of the first iterations, and the decision.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct AllocationState {
@@ -65,6 +89,8 @@ pub struct AllocationOptimizer {
     ray_costs: RayCosts,
     sharing: LightSharing,
     state: AllocationState,
+    /// From the decision on, until it is asked for.
+    efficiency: Option<ProbedEfficiency>,
 }
 
 /// The contributions of an iteration to probed sub-paths.
@@ -81,13 +107,27 @@ pub struct ProbedIteration<'a> {
     pub stride: u32,
     /// Rays of the iteration.
     pub stats: &'a RayStats,
+    /// Light sub-paths that eye vertices are connected to, over the number of those with splats at full allocation.
+    pub stored_fraction: f32,
 }
 
 impl AllocationOptimizer {
     /// Undecided among `candidates`.
     pub fn new(candidates: Vec<SampleAllocation>, ray_costs: RayCosts, sharing: LightSharing) -> AllocationOptimizer {
         let state = AllocationState { estimator: None, costs: AllocationCosts::default(), probed: 0, decided: None };
-        AllocationOptimizer { candidates, ray_costs, sharing, state }
+        AllocationOptimizer { candidates, ray_costs, sharing, state, efficiency: None }
+    }
+
+    /// Predicts also how techniques without light sub-paths would do alone.
+    #[must_use]
+    pub fn predicting_eye_only(mut self) -> AllocationOptimizer {
+        self.candidates.push(SampleAllocation::EYE_ONLY);
+        self
+    }
+
+    /// Error and cost of later iterations, once after the decision.
+    pub fn take_efficiency(&mut self) -> Option<ProbedEfficiency> {
+        self.efficiency.take()
     }
 
     /// The allocation of iteration `index`.
@@ -119,8 +159,11 @@ impl AllocationOptimizer {
         state.costs.connections += each.connection * stats.rays(&[RayKind::ShadowConnection]);
         state.probed += 1;
         if state.probed == PROBE_ITERATIONS && probed.iterations == PROBE_ITERATIONS {
-            state.decided =
-                state.estimator.take().map(|e| e.best(&variances(probed.film, probed.iterations), &state.costs));
+            let variances = variances(probed.film, probed.iterations);
+            if let Some((allocation, errors)) = state.estimator.take().map(|e| e.best(&variances, &state.costs)) {
+                state.decided = Some(allocation);
+                self.efficiency = Some(ProbedEfficiency { errors, cost: iteration_cost(probed, &allocation) });
+            }
         }
     }
 
@@ -187,22 +230,27 @@ impl AllocationOptimizer {
 #[serde(transparent)]
 pub struct SavedAllocation(AllocationState);
 
+/// Cost of an iteration at an allocation, from the rays of a later iteration than the first at full allocation.
+fn iteration_cost(probed: &ProbedIteration, allocation: &SampleAllocation) -> f64 {
+    use iteration_costs::{CONNECTION, EYE, LIGHT, PMF, WEIGHT};
+    let rays = |kinds: &[RayKind]| probed.stats.rays(kinds);
+    let light = f64::from(allocation.light_image.max(probed.stored_fraction.min(1.0)));
+    EYE * rays(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect])
+        + LIGHT * light * rays(&[RayKind::Light, RayKind::LightBounce, RayKind::ShadowLens])
+        + CONNECTION * f64::from(allocation.connections) * rays(&[RayKind::ShadowConnection])
+        + WEIGHT * rays(&[RayKind::ShadowWeight])
+        + PMF * rays(&[RayKind::ShadowPmf])
+}
+
 /// The samples of each tile.
 fn variances(film: &Film, iterations: u64) -> Vec<RegionVariance> {
     let n = iterations as f64;
-    film.tiles
-        .iter()
-        .map(|tile| {
-            let (mut variance, mut sum) = (0.0, 0.0);
-            for (s, q) in tile.sums.iter().flatten().zip(tile.squares.iter().flatten()) {
-                // Each of the n samples has this variance.
-                variance += (q - s * s / n).max(0.0) / (n - 1.0) * n / 3.0;
-                sum += s / (3.0 * n);
-            }
-            let pixels = f64::from(tile.pixels());
-            RegionVariance { pixels, variance, mean2: (sum / pixels).powi(2) }
-        })
-        .collect()
+    let region = |tile: &FilmTile| {
+        let pixels = f64::from(tile.pixels());
+        let mean = tile.sums.iter().flatten().sum::<f64>() / (3.0 * n * pixels);
+        RegionVariance { pixels, variance: n * tile.sample_variance(iterations), mean2: mean * mean }
+    };
+    film.tiles.iter().map(region).collect()
 }
 
 #[cfg(test)]

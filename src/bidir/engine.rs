@@ -1,6 +1,6 @@
 //! The engine of bidirectional methods: the passes of an iteration, saved states, and replays.
 
-use super::allocation::{AllocationOptimizer, ProbedIteration, SavedAllocation};
+use super::allocation::{AllocationOptimizer, ProbedEfficiency, ProbedIteration, SavedAllocation};
 use super::assignment::{BLOCK_SIDE, contains};
 use super::eye_subpath::{EyeHooks, EyeSubpathRules};
 use super::light_pass::{LightPathPurpose, light_sampler};
@@ -317,6 +317,11 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         if self.draws_stored() {
             self.strategy.learn(&self.store);
         }
+        let [width, height] = iteration.scene.film_size.map(|n| n as f32);
+        let stored_fraction = match self.strategy.light_subpaths() {
+            LightSubpaths::Shared { count, .. } => count as f32 / (width * height),
+            LightSubpaths::OfPixel => 0.0,
+        };
         if let (Some(optimizer), ProbeStride(Some(stride))) = (&mut self.optimizer, self.probe_stride)
             && optimizer.probe_stride(iteration.index, 1).is_some()
         {
@@ -327,6 +332,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
                 contributions: &output.probed,
                 stride,
                 stats: &output.stats,
+                stored_fraction,
             });
         }
         if let Some(pyramid) = &mut self.pyramid {
@@ -335,6 +341,16 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
             }
             pyramid.iterations += 1;
         }
+    }
+
+    /// Error and cost of later iterations as the first ones predict them, once after the allocation was decided.
+    pub fn take_efficiency(&mut self) -> Option<ProbedEfficiency> {
+        self.optimizer.as_mut().and_then(AllocationOptimizer::take_efficiency)
+    }
+
+    /// Iterations that must be rendered, in order, before iteration `index` can be replayed.
+    pub fn missing_before(&self, index: u64) -> u64 {
+        self.optimizer.as_ref().map_or(0, |o| o.missing(index))
     }
 
     /// Sentences about what was built and decided.
@@ -400,7 +416,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
     /// Runs the sample of one pixel again and writes it down.
     pub fn replay(&mut self, iteration: &Iteration, pixel: (u32, u32)) -> Replay {
         let scene = iteration.scene;
-        let missing = self.optimizer.as_ref().map_or(0, |o| o.missing(iteration.index));
+        let missing = self.missing_before(iteration.index);
         if missing >= 2 {
             let mut film = Film::new(scene.window);
             for _ in 0..missing {

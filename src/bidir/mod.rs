@@ -35,7 +35,7 @@ pub mod strategy;
 pub mod vertex;
 pub mod warm_up;
 
-pub use allocation::{AllocationOptimizer, RayCosts};
+pub use allocation::{AllocationOptimizer, ProbedEfficiency, RayCosts};
 pub use engine::{BidirSettings, Bidirectional};
 pub use light_subpath::LightSubpath;
 pub use replay::{ContributionRecord, Replay};

@@ -39,6 +39,13 @@ impl FilmTile {
         }
     }
 
+    /// Sum over pixels of the variance of one sample, the mean of the channels, from `n` samples of each pixel.
+    pub fn sample_variance(&self, n: u64) -> f64 {
+        let n = n as f64;
+        let sums = self.sums.iter().flatten().zip(self.squares.iter().flatten());
+        sums.map(|(s, q)| (q - s * s / n).max(0.0) / (n - 1.0) / 3.0).sum()
+    }
+
     /// Pixels in the tile.
     pub fn pixels(&self) -> u32 {
         self.width * self.height

@@ -1,7 +1,7 @@
 //! Bidirectional methods as integrators: the engine of `bidir` behind the trait, and the settings that their parameters
 //! have in common.
 
-use super::{Integrator, Iteration, Params, Replay};
+use super::{Integrator, Iteration, Params, Replay, fallback};
 use crate::bidir::allocation::combinations;
 use crate::bidir::{AllocationOptimizer, BidirSettings, Bidirectional, ConnectionStrategy, RayCosts};
 use crate::film::{Film, Pyramid};
@@ -38,7 +38,8 @@ pub fn resampled_settings(params: &Params, techniques: Techniques) -> BidirSetti
 pub fn optimizer(params: &Params) -> Option<AllocationOptimizer> {
     let candidates = || combinations(&[1.0, 0.25, 0.0625, 0.015_625], &[1.0, 0.5, 0.25, 0.125, 0.0625]);
     let new = || AllocationOptimizer::new(candidates(), RayCosts::SHARED_SUBPATHS, LightSharing::OfIteration);
-    params.is("allocation", "auto").then(new)
+    let optimizer = params.is("allocation", "auto").then(new)?;
+    Some(if fallback::is_allowed(params) { optimizer.predicting_eye_only() } else { optimizer })
 }
 
 impl<S: ConnectionStrategy> Integrator for Bidirectional<S> {

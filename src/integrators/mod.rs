@@ -5,6 +5,7 @@
 
 pub mod bdpt;
 pub mod bidirectional;
+pub mod fallback;
 pub mod importance;
 pub mod light;
 pub mod lvc;

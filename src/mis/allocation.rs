@@ -21,6 +21,10 @@
 //! (k − 1) times the variance of connections is taken for (B − 1) C, as if it all came from the light sub-path.
 //!
 //! Sums are kept by region of the picture, so that each region counts relative to its own brightness.
+//!
+//! [`SampleAllocation::EYE_ONLY`] leaves little but hits and next event. Its predicted variance is about that of path
+//! tracing with the roulette of the probed eye sub-paths, and tells whether path tracing finds the light that
+//! connections found.
 
 use super::weight::MisWeight;
 use crate::math::Rgb;
@@ -49,6 +53,9 @@ pub struct AllocationCosts {
 impl SampleAllocation {
     /// All samples.
     pub const FULL: SampleAllocation = SampleAllocation { light_image: 1.0, connections: 1.0 };
+    /// Hits and next event, nearly alone. It is predicted for comparison with path tracing, never chosen. Path tracing
+    /// itself is not predicted: light that it cannot find would make its variance infinite.
+    pub const EYE_ONLY: SampleAllocation = SampleAllocation { light_image: 1e-3, connections: 1e-3 };
 
     /// D′/D of a path with these weights at full allocation.
     fn density_ratio(&self, weight: &MisWeight) -> f64 {
@@ -135,6 +142,23 @@ pub struct RegionVariance {
     pub variance: f64,
     /// Square of their mean.
     pub mean2: f64,
+}
+
+/// What the variance of each region is divided by: the square of its mean, and a share of the mean over all regions.
+fn scales(variances: &[RegionVariance]) -> impl Iterator<Item = f64> {
+    let overall = variances.iter().map(|v| v.mean2).sum::<f64>() / variances.len().max(1) as f64;
+    variances.iter().map(move |v| v.mean2 + 0.01 * overall)
+}
+
+/// Errors of an iteration as the probes predict them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ProbedErrors {
+    /// Relative variance at the chosen allocation, the mean of pixels and of regions, summed over pixels.
+    pub variance: f64,
+    /// As much at [`SampleAllocation::EYE_ONLY`], if that is one of the candidates.
+    pub eye_only: Option<f64>,
+    /// What the variance of each region is divided by, in squared radiance.
+    pub scales: Vec<f64>,
 }
 
 /// Estimates from samples at full allocation, for each region of the picture and every candidate, by how much the
@@ -270,31 +294,53 @@ impl EfficiencyEstimator {
         }
     }
 
+    /// Relative variance of a candidate, the mean of pixels and of regions, summed over both samples of all pixels. A
+    /// share of the mean over all regions keeps dark ones from counting too much.
+    fn relative_variance(&self, number: usize, variances: &[RegionVariance]) -> f64 {
+        // Paths of hits and next event are independent.
+        let shares = self.candidates[number] != SampleAllocation::EYE_ONLY;
+        let relative = |(region, (v, scale)): (usize, (&RegionVariance, f64))| {
+            let shared = if shares { self.shared_error(region, number, v.pixels) } else { 0.0 };
+            let variance = v.variance + self.increases[region * self.candidates.len() + number] + shared;
+            // An estimate of a variance from two samples may be negative.
+            if scale > 0.0 { variance.max(0.0) / scale } else { 0.0 }
+        };
+        variances.iter().zip(scales(variances)).enumerate().map(relative).sum()
+    }
+
     /// The candidate with the least product of variance and cost, or of those that are nearly as good the one with most
-    /// connections. A share of the mean over all regions keeps dark ones from counting too much.
-    pub fn best(&self, variances: &[RegionVariance], costs: &AllocationCosts) -> SampleAllocation {
-        let overall = variances.iter().map(|v| v.mean2).sum::<f64>() / variances.len().max(1) as f64;
-        let product = |number: usize| {
-            let increases = self.increases.chunks_exact(self.candidates.len());
-            let relative = |(region, (increases, v)): (usize, (&[f64], &RegionVariance))| {
-                let scale = v.mean2 + 0.01 * overall;
-                let variance = v.variance + increases[number] + self.shared_error(region, number, v.pixels);
-                // An estimate of a variance from two samples may be negative.
-                if scale > 0.0 { variance.max(0.0) / scale } else { 0.0 }
-            };
-            let variance: f64 = increases.zip(variances).enumerate().map(relative).sum();
-            variance * self.candidates[number].cost(costs)
+    /// connections, and its errors.
+    pub fn best(&self, variances: &[RegionVariance], costs: &AllocationCosts) -> (SampleAllocation, ProbedErrors) {
+        struct Choice {
+            allocation: SampleAllocation,
+            variance: f64,
+            product: f64,
+        }
+        let choices = self.candidates.iter().enumerate().filter(|(_, a)| **a != SampleAllocation::EYE_ONLY);
+        let choices: Vec<Choice> = choices
+            .map(|(number, &allocation)| {
+                let variance = self.relative_variance(number, variances);
+                Choice { allocation, variance, product: variance * allocation.cost(costs) }
+            })
+            .collect();
+        let least = choices.iter().map(|c| c.product).fold(f64::INFINITY, f64::min);
+        let good = choices.iter().filter(|c| c.product <= least / LEAST_GAIN);
+        let order = |a: &&Choice, b: &&Choice| {
+            a.allocation
+                .connections
+                .total_cmp(&b.allocation.connections)
+                .then(b.product.total_cmp(&a.product))
+                .then(a.allocation.light_image.total_cmp(&b.allocation.light_image))
         };
-        let products: Vec<f64> = (0..self.candidates.len()).map(product).collect();
-        let least = products.iter().copied().fold(f64::INFINITY, f64::min);
-        let good = self.candidates.iter().zip(products).filter(|(_, product)| *product <= least / LEAST_GAIN);
-        let order = |a: &(&SampleAllocation, f64), b: &(&SampleAllocation, f64)| {
-            a.0.connections
-                .total_cmp(&b.0.connections)
-                .then(b.1.total_cmp(&a.1))
-                .then(a.0.light_image.total_cmp(&b.0.light_image))
+        let eye_only = self.candidates.iter().position(|a| *a == SampleAllocation::EYE_ONLY);
+        let (allocation, variance) =
+            good.max_by(order).map_or((SampleAllocation::FULL, 0.0), |c| (c.allocation, c.variance));
+        let errors = ProbedErrors {
+            variance: 0.5 * variance,
+            eye_only: eye_only.map(|number| 0.5 * self.relative_variance(number, variances)),
+            scales: scales(variances).collect(),
         };
-        good.max_by(order).map_or(SampleAllocation::FULL, |(allocation, _)| *allocation)
+        (allocation, errors)
     }
 
     /// True if the sums are of these candidates, as many regions and as many probed pixels: a saved state can be of
@@ -424,7 +470,7 @@ mod tests {
             statistics.add(7, &contribution_of(1.0, weight), 1.0);
             statistics.add(1, &contribution_of(f32::NAN, weight), 1.0);
             let region = |mean2| RegionVariance { pixels: 1.0, variance: 1.0, mean2 };
-            statistics.best(&[region(1.0), region(0.5)], &COSTS)
+            statistics.best(&[region(1.0), region(0.5)], &COSTS).0
         };
         assert_eq!(decide(0.0, 0.0), SampleAllocation { light_image: 0.0625, connections: 0.0625 });
         assert_eq!(decide(0.0, 0.95), SampleAllocation { light_image: 0.0625, connections: 1.0 });
@@ -432,7 +478,8 @@ mod tests {
         // In a scene without light there is nothing to decide.
         assert_eq!(
             EfficiencyEstimator::new(candidates(), 1, 0, LightSharing::OfIteration)
-                .best(&[RegionVariance { pixels: 1.0, variance: 0.0, mean2: 0.0 }], &COSTS),
+                .best(&[RegionVariance { pixels: 1.0, variance: 0.0, mean2: 0.0 }], &COSTS)
+                .0,
             SampleAllocation::FULL
         );
     }
@@ -484,7 +531,7 @@ mod tests {
                     statistics.add_sample(Probe { region: 0, pixel, second }, &[c], 1.0);
                 }
             }
-            statistics.best(&[RegionVariance { pixels: 2.0, variance: 8.0, mean2: 1.0 }], &COSTS).light_image
+            statistics.best(&[RegionVariance { pixels: 2.0, variance: 8.0, mean2: 1.0 }], &COSTS).0.light_image
         };
         assert_eq!(decide(LightSharing::OfPixels), 1.0);
         assert_eq!(decide(LightSharing::OfIteration), 0.0625);

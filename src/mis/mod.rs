@@ -47,7 +47,9 @@ pub mod pdfs;
 pub mod technique;
 pub mod weight;
 
-pub use allocation::{AllocationCosts, EfficiencyEstimator, LightSharing, SampleAllocation};
+pub use allocation::{
+    AllocationCosts, EfficiencyEstimator, LightSharing, ProbedErrors, RegionVariance, SampleAllocation,
+};
 pub use factor::{ConnectionFactor, IncidentSubpath, ResamplingTarget};
 pub use oracle::{AdjacentVertices, PathPdfs};
 pub use pdfs::{EyeSubpathPdfs, ReverseTransport, SubpathPdfs, VertexPdfs};

@@ -22,9 +22,11 @@ pub const ASSIGNMENT: u64 = 7;
 /// Paths of the path tracer. They are not the eye sub-paths of bidirectional methods, so that renders of both with one
 /// seed are independent.
 pub const PATH: u64 = 8;
+/// Paths of the path tracer that only tell how well it does, and are not part of a picture.
+pub const PATH_PROBE: u64 = 9;
 
 /// Every stream with its name.
-pub const ALL: [(&str, u64); 8] = [
+pub const ALL: [(&str, u64); 9] = [
     ("eye", EYE),
     ("auxiliary", AUXILIARY),
     ("light", LIGHT),
@@ -33,6 +35,7 @@ pub const ALL: [(&str, u64); 8] = [
     ("first stage", FIRST_STAGE),
     ("assignment", ASSIGNMENT),
     ("path", PATH),
+    ("path probe", PATH_PROBE),
 ];
 
 #[cfg(test)]

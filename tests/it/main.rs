@@ -8,6 +8,7 @@ mod checkpoints;
 mod cli;
 mod cli_techniques;
 mod factors;
+mod fallback;
 mod furnace;
 mod image_metrics;
 mod images;

@@ -7,8 +7,10 @@
 mod own_subpath;
 mod params;
 
-use super::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, TECHNIQUES, heuristic};
-use super::{Integrator, IntegratorSpec, Params, bidirectional};
+use super::params::shared::{
+    ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, PATH_FALLBACK, RR_DEPTH_BIDIRECTIONAL, TECHNIQUES, heuristic,
+};
+use super::{Integrator, IntegratorSpec, Params, bidirectional, fallback};
 use crate::bidir::allocation::combinations;
 use crate::bidir::{AllocationOptimizer, BidirSettings, Bidirectional, RayCosts};
 use crate::mis::{Heuristic, LightSharing, SampleAllocation};
@@ -27,7 +29,7 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
         light transport\"; Veach 1997, chapter 10.",
     params: &[
         &[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS, heuristic("balance"), TECHNIQUES],
-        &[ALLOCATION, params::LIGHT_PATHS, params::CONNECTIONS],
+        &[ALLOCATION, params::LIGHT_PATHS, params::CONNECTIONS, PATH_FALLBACK],
     ],
     unbiased: true,
     limitations: |_| None,
@@ -47,11 +49,11 @@ fn build(params: &Params) -> Box<dyn Integrator> {
     match (&candidates[..], heuristic) {
         // The variance at other numbers of samples is known for the balance heuristic only.
         (&[only], _) | (&[only, ..], Heuristic::Power) => Box::new(this.with_allocation(only)),
-        _ => Box::new(this.with_optimizer(Some(AllocationOptimizer::new(
-            candidates,
-            RayCosts::OWN_SUBPATH,
-            LightSharing::OfPixels,
-        )))),
+        _ => {
+            let optimizer = AllocationOptimizer::new(candidates, RayCosts::OWN_SUBPATH, LightSharing::OfPixels);
+            let optimizer = if fallback::is_allowed(params) { optimizer.predicting_eye_only() } else { optimizer };
+            fallback::with_path_fallback(params, this.with_optimizer(Some(optimizer)))
+        }
     }
 }
 

@@ -30,8 +30,9 @@ pub use ic_bdpt::IC_BDPT;
 pub use importance_caching::IMPORTANCE_CACHING;
 pub use skeleton::SKELETON;
 
+use super::fallback::with_path_fallback;
 use super::params::presampled::RR_SCALE;
-use super::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES};
+use super::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, PATH_FALLBACK, RR_DEPTH_RESAMPLED, TECHNIQUES};
 use super::{Integrator, ParamSpec, Params, bidirectional};
 use crate::bidir::Bidirectional;
 use crate::mis::factors::{Balance, PerLengthFactor, RecordMixtureFactor};
@@ -50,7 +51,7 @@ const CANDIDATES: &[ParamSpec] = &[
     params::CONNECTIONS_PER_VERTEX,
 ];
 /// Parameters of methods with several techniques, after those of their records.
-const SELECTION: &[ParamSpec] = &[params::SELECTION, params::DISTRIBUTIONS, params::WEIGHTS, ALLOCATION];
+const SELECTION: &[ParamSpec] = &[params::SELECTION, params::DISTRIBUTIONS, params::WEIGHTS, ALLOCATION, PATH_FALLBACK];
 
 fn scheme(params: &Params) -> SelectionScheme {
     SelectionScheme {
@@ -85,7 +86,10 @@ fn build(params: &Params, places: RecordPlaces) -> Box<dyn Integrator> {
     let optimizer = bidirectional::optimizer(params);
     macro_rules! with_factor {
         ($factor:ty) => {
-            Box::new(Bidirectional::new(common, RecordStrategy::<$factor>::new(settings)).with_optimizer(optimizer))
+            with_path_fallback(
+                params,
+                Bidirectional::new(common, RecordStrategy::<$factor>::new(settings)).with_optimizer(optimizer),
+            )
         };
     }
     match (params.is("weights", "balance"), settings.scheme.selection) {

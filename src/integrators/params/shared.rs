@@ -110,7 +110,20 @@ pub const ALLOCATION: ParamSpec = ParamSpec {
     unit: "",
     short: "How many light sub-paths and connections an iteration takes",
     long: "A scene in which connections or the light image contribute little is rendered sooner with fewer of them. \
-        No technique is ever given up: at least 1/16 of the connections and 1/64 of the light sub-paths remain. The \
+        At least 1/16 of the connections and 1/64 of the light sub-paths remain, unless path tracing takes over (path_fallback). The \
         decision depends on earlier iterations only, so that every iteration is unbiased, and on counts of rays \
         rather than on times, so that it is the same on any machine. Choose `full` to repeat published methods.",
+};
+
+/// Path tracing may render the scene.
+pub const PATH_FALLBACK: ParamSpec = ParamSpec {
+    name: "path_fallback",
+    aliases: &[],
+    default: ParamDefault::Bool(true),
+    unit: "",
+    short: "Leaves the render to path tracing where that is more efficient",
+    long: "With allocation=auto and all techniques, the first two iterations and a few samples of the path tracer tell \
+        which of them has the smaller product of cost and error, of pixels and of 16x16 blocks alike. Scenes in which \
+        next event finds all light are then rendered as `path` renders them. Light that only the method can find \
+        keeps it at work. The choice is written into the statistics. The expected picture is the same.",
 };

@@ -8,7 +8,7 @@
 //! with weight one.
 
 use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_UNIDIRECTIONAL, heuristic};
-use super::{Integrator, IntegratorSpec, Iteration, Params};
+use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, Params};
 use crate::bidir::endpoint::{
     DirectLight, emitted_at, for_each_background, light_choice_normal, next_event_pdf, sample_direct,
 };
@@ -22,7 +22,7 @@ use crate::path::{
     Edge, PathLimits, ScatterSampler, ShadowQueue, Transmittance, Vertex, WalkHooks, WalkRules, WalkStart,
     direct_segment, streams, walk,
 };
-use crate::prepared::PreparedScene;
+use crate::prepared::{Features, PreparedScene};
 use crate::ray::{Phases, RayKind, RayStats, Tracer};
 use crate::shade::Transport;
 use rayon::prelude::*;
@@ -43,7 +43,24 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
     build: |params| Box::new(PathTracer::new(params)),
 };
 
-struct PathTracer {
+/// Every n-th pixel of a tile is probed. The number has no common factor with a tile's side, so that rows differ.
+const PROBE_STRIDE: u32 = 7;
+/// Samples of each probed pixel.
+const PROBE_SAMPLES: u64 = 4;
+
+/// How well the path tracer does in a scene.
+#[derive(Clone, Debug)]
+pub struct PathProbe {
+    /// For each tile of the film, the sum over its pixels of the variance of a sample, the mean of the channels.
+    pub variances: Vec<f64>,
+    /// Rays of one sample of every pixel.
+    pub rays: f64,
+    /// Rays of the probe itself.
+    pub stats: RayStats,
+}
+
+/// The path tracer at work.
+pub struct PathTracer {
     limits: PathLimits,
     hide_emitters: bool,
     heuristic: Heuristic,
@@ -51,41 +68,109 @@ struct PathTracer {
 
 impl PathTracer {
     fn new(params: &Params) -> PathTracer {
+        let heuristic = if params.is("heuristic", "balance") { Heuristic::Balance } else { Heuristic::Power };
+        PathTracer { heuristic, ..PathTracer::with_limits(params, params.int("rr_depth") as u32) }
+    }
+
+    /// The path tracer with its defaults, as far as the parameters of another method do not say otherwise.
+    pub fn beside(params: &Params) -> PathTracer {
+        let ParamDefault::Int { default, .. } = RR_DEPTH_UNIDIRECTIONAL.default else { unreachable!() };
+        PathTracer::with_limits(params, default as u32)
+    }
+
+    fn with_limits(params: &Params, rr_depth: u32) -> PathTracer {
+        let max_edges = u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX);
         PathTracer {
-            limits: PathLimits {
-                max_edges: u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX),
-                rr_depth: params.int("rr_depth") as u32,
-                rr_scale: 1.0,
-            },
+            limits: PathLimits { max_edges, rr_depth, rr_scale: 1.0 },
             hide_emitters: params.bool("hide_emitters"),
-            heuristic: if params.is("heuristic", "balance") { Heuristic::Balance } else { Heuristic::Power },
+            heuristic: Heuristic::Power,
+        }
+    }
+
+    /// Light that no path of this method brings in a scene with these features: it meets a delta light only by next
+    /// event, which mirrors, glass and masks block.
+    pub fn is_blind(features: Features) -> bool {
+        features.contains(Features::DELTA_LIGHTS)
+            && (features.contains(Features::SPECULAR) || features.contains(Features::MASKS))
+    }
+
+    /// Samples some pixels of every tile a few times, by random numbers of their own.
+    pub fn probe(&self, iteration: &Iteration) -> PathProbe {
+        let mut film = Film::new(iteration.scene.window);
+        let mut stats = RayStats::default();
+        for _ in 0..PROBE_SAMPLES {
+            let iteration = iteration.with_index(film.begin_iteration());
+            stats.merge(&self.render(&iteration, &mut film, &PixelChoice::PROBE));
+        }
+        let (all, probed) = film
+            .tiles
+            .iter()
+            .fold((0, 0), |(all, probed), tile| (all + tile.pixels(), probed + tile.pixels().div_ceil(PROBE_STRIDE)));
+        let share = |tile: &FilmTile| f64::from(tile.pixels()) / f64::from(tile.pixels().div_ceil(PROBE_STRIDE));
+        PathProbe {
+            variances: film.tiles.iter().map(|t| t.sample_variance(PROBE_SAMPLES) * share(t)).collect(),
+            rays: stats.rays(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect]) * f64::from(all)
+                / (f64::from(probed) * PROBE_SAMPLES as f64),
+            stats,
         }
     }
 
     /// One sample of a pixel, which is number `hooks.pixel` of its tile.
-    fn sample(&self, iteration: &Iteration, pixel: (u32, u32), tracer: &mut Tracer, hooks: &mut Gather) {
+    fn sample(&self, iteration: &Iteration, stream: u64, pixel: (u32, u32), tracer: &mut Tracer, hooks: &mut Gather) {
         let index = iteration.pixel_index(pixel.0, pixel.1);
-        let mut sampler = PathSampler::new(iteration.seed, streams::PATH, index, iteration.index);
+        let mut sampler = PathSampler::new(iteration.seed, stream, index, iteration.index);
         let start = WalkStart::from_camera(iteration, pixel, &mut sampler).walk;
         let rules = WalkRules { limits: self.limits, mode: Transport::Radiance, directions: &ScatterSampler };
         hooks.normal_before = None;
         walk(iteration.scene, start, &rules, tracer, &mut sampler, hooks);
     }
 
-    fn render_tile(&self, iteration: &Iteration, tile: &mut FilmTile, samples: &mut SampleBuffer) -> RayStats {
+    fn render(&self, iteration: &Iteration, film: &mut Film, choice: &PixelChoice) -> RayStats {
+        let mut phases = Phases::default();
+        // A tile is much more work than handing it over, and larger pieces leave threads idle at the end of an
+        // iteration.
+        let tiles = film.tiles.par_iter_mut().with_max_len(1);
+        let render = |samples: &mut SampleBuffer, tile| self.render_tile(iteration, choice, tile, samples);
+        let tiles = tiles.map_init(SampleBuffer::default, render);
+        let sum = |mut a: RayStats, b: RayStats| {
+            a.merge(&b);
+            a
+        };
+        let stats = phases.time("eye paths and film", || tiles.reduce(RayStats::default, sum));
+        RayStats { phases, ..stats }
+    }
+
+    fn render_tile(
+        &self,
+        iteration: &Iteration,
+        choice: &PixelChoice,
+        tile: &mut FilmTile,
+        samples: &mut SampleBuffer,
+    ) -> RayStats {
         let scene = iteration.scene;
         let mut tracer = iteration.tracer();
         let mut queue = ShadowQueue::new(RayKind::ShadowDirect);
         samples.clear(tile.pixels());
         let mut hooks = Gather::new(self, scene, samples, &mut queue);
-        for pixel in 0..tile.pixels() {
+        for pixel in (0..tile.pixels()).step_by(choice.stride) {
             hooks.pixel = pixel;
-            self.sample(iteration, tile.pixel(pixel), &mut tracer, &mut hooks);
+            self.sample(iteration, choice.stream, tile.pixel(pixel), &mut tracer, &mut hooks);
         }
         queue.flush(&mut tracer, |light, transmittance| light.arrive(transmittance, samples, None));
         tile.commit(samples, None, iteration.index);
         tracer.stats
     }
+}
+
+/// Which pixels of a tile are sampled, and by which random numbers.
+struct PixelChoice {
+    stride: usize,
+    stream: u64,
+}
+
+impl PixelChoice {
+    const ALL: PixelChoice = PixelChoice { stride: 1, stream: streams::PATH };
+    const PROBE: PixelChoice = PixelChoice { stride: PROBE_STRIDE as usize, stream: streams::PATH_PROBE };
 }
 
 /// The payload of a shadow ray.
@@ -111,18 +196,7 @@ impl QueuedLight {
 
 impl Integrator for PathTracer {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
-        let this = &*self;
-        let mut phases = Phases::default();
-        // A tile is much more work than handing it over, and larger pieces leave threads idle at the end of an
-        // iteration.
-        let tiles = film.tiles.par_iter_mut().with_max_len(1);
-        let tiles = tiles.map_init(SampleBuffer::default, |samples, tile| this.render_tile(iteration, tile, samples));
-        let sum = |mut a: RayStats, b: RayStats| {
-            a.merge(&b);
-            a
-        };
-        let stats = phases.time("eye paths and film", || tiles.reduce(RayStats::default, sum));
-        RayStats { phases, ..stats }
+        self.render(iteration, film, &PixelChoice::ALL)
     }
 
     fn replay(&mut self, iteration: &Iteration, pixel: (u32, u32)) -> Replay {
@@ -131,7 +205,7 @@ impl Integrator for PathTracer {
         let (mut tracer, mut queue) = (iteration.tracer(), ShadowQueue::new(RayKind::ShadowDirect));
         let mut hooks = Gather::new(self, iteration.scene, &mut samples, &mut queue);
         hooks.replay = Some(&mut replay);
-        self.sample(iteration, pixel, &mut tracer, &mut hooks);
+        self.sample(iteration, streams::PATH, pixel, &mut tracer, &mut hooks);
         queue.flush(&mut tracer, |light, transmittance| {
             light.arrive(transmittance, &mut samples, Some(&mut replay));
         });

@@ -20,6 +20,7 @@ pub use pcbpt::PCBPT;
 pub use ris::RIS;
 pub use two_stage::TWO_STAGE;
 
+use super::fallback::with_path_fallback;
 use super::params::presampled::{CONNECTIONS_PER_VERTEX, RR_SCALE};
 use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES};
 use super::{Integrator, ParamSpec, Params, bidirectional};
@@ -102,7 +103,10 @@ fn build(params: &Params, paths: u32, second_stage: Option<u32>) -> Box<dyn Inte
     let optimizer = bidirectional::optimizer(params);
     macro_rules! with_factor {
         ($factor:ty) => {
-            Box::new(Bidirectional::new(common, CacheStrategy::<$factor>::new(settings)).with_optimizer(optimizer))
+            with_path_fallback(
+                params,
+                Bidirectional::new(common, CacheStrategy::<$factor>::new(settings)).with_optimizer(optimizer),
+            )
         };
     }
     match model {

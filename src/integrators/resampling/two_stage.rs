@@ -3,7 +3,9 @@
 
 use super::params;
 use crate::integrators::params::presampled::{CONNECTIONS_PER_VERTEX, RR_SCALE};
-use crate::integrators::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES};
+use crate::integrators::params::shared::{
+    ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, PATH_FALLBACK, RR_DEPTH_RESAMPLED, TECHNIQUES,
+};
 use crate::integrators::{IntegratorSpec, ParamSpec};
 
 const PARAMS: &[ParamSpec] = &[
@@ -27,6 +29,7 @@ const PARAMS: &[ParamSpec] = &[
     params::UNSEEN_MODEL,
     params::TWO_STAGE_WEIGHTS,
     ALLOCATION,
+    PATH_FALLBACK,
 ];
 
 /// The registry's line.
