@@ -138,7 +138,10 @@ pub(crate) struct RenderArgs {
     /// Save a checkpoint every minute and at the end
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
-    /// Go on from a checkpoint
+    /// Least time between two checkpoints, which are saved between iterations [default: 60s]
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub checkpoint_interval: Option<Duration>,
+    /// Go on from a checkpoint, and save to the same file unless --checkpoint names another
     #[arg(long, value_name = "FILE")]
     pub resume: Option<PathBuf>,
     /// Print nothing but errors

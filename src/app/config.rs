@@ -79,6 +79,7 @@ impl RenderArgs {
             time: self.time,
             error_target: self.error_target,
             checkpoint: self.checkpoint.clone(),
+            checkpoint_interval: self.checkpoint_interval,
             resume: self.resume.clone(),
             outputs,
         })

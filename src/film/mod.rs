@@ -16,6 +16,8 @@ use crate::math::Rgb;
 
 /// Pixels along a tile's side.
 pub const TILE: u32 = 16;
+/// Largest number of iterations: beyond, sums of double precision would not grow by a sample any more.
+pub const MAX_ITERATIONS: u64 = 1 << 53;
 /// Places of non-finite samples that are kept; the count goes on.
 const KEPT_PLACES: usize = 16;
 
@@ -140,6 +142,22 @@ impl Film {
         let layout = |t: &FilmTile| ([t.x0, t.y0, t.width, t.height], t.sums.len(), t.squares.len());
         [self.x0, self.y0, self.width, self.height] == window
             && self.tiles.iter().map(layout).eq(expected.tiles.iter().map(layout))
+    }
+
+    /// True if iterations can have made the sums: all are finite, no square of a sum exceeds the iterations times the
+    /// sum of squares (Cauchy and Schwarz, up to rounding), and the counts fit the number of samples.
+    pub fn is_plausible(&self) -> bool {
+        let (n, rounding) = (self.iterations as f64, 1.0 + 1e-9);
+        let possible = |sum: &f64, squares: &f64| {
+            sum.is_finite() && squares.is_finite() && *squares >= 0.0 && sum * sum <= n * squares * rounding
+        };
+        let tile = |t: &FilmTile| {
+            let samples = self.iterations.saturating_mul(u64::from(t.width) * u64::from(t.height));
+            t.non_finite <= samples
+                && t.places.len() as u64 <= t.non_finite
+                && t.sums.as_flattened().iter().zip(t.squares.as_flattened()).all(|(s, q)| possible(s, q))
+        };
+        self.iterations <= MAX_ITERATIONS && self.tiles.iter().all(tile)
     }
 
     /// How many samples were not finite, and where the first of them were.

@@ -75,6 +75,12 @@ impl Pyramid {
         self.window == window && self.max_edges == max_edges && whole
     }
 
+    /// True if all sums are finite, and zero if there were no iterations.
+    pub fn is_plausible(&self) -> bool {
+        let mut values = self.sums.iter().flatten().flatten().flatten();
+        if self.iterations == 0 { values.all(|v| *v == 0.0) } else { values.all(|v| v.is_finite()) }
+    }
+
     /// Width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
         [self.window[2], self.window[3]]

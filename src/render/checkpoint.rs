@@ -175,12 +175,15 @@ impl RenderIdentity {
             return Err(CheckpointError::Other { path: path.to_owned(), difference });
         }
         let has_pyramid = |e: &SavedEstimator| match (&e.pyramid, self.pyramid_edges) {
-            (Some(pyramid), Some(edges)) => pyramid.is_of(self.window, edges),
+            (Some(pyramid), Some(edges)) => {
+                pyramid.is_of(self.window, edges) && pyramid.is_plausible() && pyramid.iterations <= e.film.iterations()
+            }
             (pyramid, edges) => pyramid.is_none() && edges.is_none(),
         };
-        let whole = found.estimators.iter().all(|e| e.film.is_of_window(self.window) && has_pyramid(e));
+        let is_sound = |film: &Film| film.is_of_window(self.window) && film.is_plausible();
+        let whole = found.estimators.iter().all(|e| is_sound(&e.film) && has_pyramid(e));
         if !whole || found.estimators.len() != self.estimators() {
-            let reason = "the checkpoint is damaged: its pictures are not those of this render".into();
+            let reason = "the checkpoint is damaged: its pictures cannot be those of this render".into();
             return Err(CheckpointError::Format { path: path.to_owned(), reason });
         }
         Ok(found.estimators)
@@ -250,5 +253,98 @@ impl Write for Checksummed<'_> {
 
     fn flush(&mut self) -> std::io::Result<()> {
         self.file.flush().map_err(|e| self.keep(e))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{ContributionKind, SampleBuffer};
+    use crate::math::Rgb;
+
+    const WINDOW: [u32; 4] = [0, 0, 2, 1];
+
+    /// Makes the sums of an estimator wrong.
+    type Change = fn(&mut Film, &mut Pyramid);
+
+    fn identity() -> RenderIdentity {
+        RenderIdentity {
+            integrator: "path".into(),
+            params: vec![],
+            seed: 0,
+            error_target: false,
+            pyramid_edges: Some(2),
+            film_size: [2, 1],
+            window: WINDOW,
+            scene_hash: 1,
+            backend: "none".into(),
+        }
+    }
+
+    /// Two iterations of a film and a pyramid.
+    fn saved() -> (Film, Pyramid) {
+        let (mut film, mut buffer) = (Film::new(WINDOW), SampleBuffer::default());
+        for value in [1.0, 3.0] {
+            let iteration = film.begin_iteration();
+            buffer.clear(2);
+            (0..2).for_each(|pixel| buffer.add(ContributionKind::Hit, pixel, Rgb::grey(value)));
+            film.tiles[0].commit(&buffer, None, iteration);
+        }
+        let mut pyramid = Pyramid::new(WINDOW, 2);
+        pyramid.add((0, 2), (1, 0), Rgb::WHITE, 1.0);
+        pyramid.iterations = 2;
+        (film, pyramid)
+    }
+
+    /// Saves what `change` makes of a film and its pyramid, with a right checksum, and loads it.
+    fn load(change: impl FnOnce(&mut Film, &mut Pyramid)) -> Result<Vec<SavedEstimator>, CheckpointError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c");
+        let (mut film, mut pyramid) = saved();
+        change(&mut film, &mut pyramid);
+        let identity = identity();
+        let estimators = vec![EstimatorRef { film: &film, state: vec![], pyramid: Some(&pyramid) }];
+        let contents = ContentsRef { identity: &identity, estimators };
+        atomic_write(&path, |file| encode(&contents, file)).unwrap();
+        identity.load(&path)
+    }
+
+    #[test]
+    fn sums_that_no_render_can_have_are_refused_whatever_the_checksum_says() {
+        assert!(load(|_, _| {}).is_ok());
+        let changes: [(&str, Change); 8] = [
+            ("not a number", |film, _| film.tiles[0].sums[1][2] = f64::NAN),
+            ("infinite squares", |film, _| film.tiles[0].squares[0][0] = f64::INFINITY),
+            ("negative squares", |film, _| film.tiles[0].squares[0][0] = -1.0),
+            ("a sum without samples", |film, _| film.tiles[0].sums[0] = [100.0; 3]),
+            ("more bad samples than samples", |film, _| film.tiles[0].non_finite = 5),
+            ("a pixel too few", |film, _| film.tiles[0].sums.truncate(1)),
+            ("a pyramid of more iterations", |_, pyramid| pyramid.iterations = 3),
+            ("a pyramid that is not finite", |_, pyramid| pyramid.merge(&broken_pyramid())),
+        ];
+        for (what, change) in changes {
+            let refused = load(change).err().unwrap_or_else(|| panic!("{what} is accepted"));
+            assert!(refused.to_string().contains("damaged"), "{what}: {refused}");
+        }
+    }
+
+    /// A pyramid whose sums overflow.
+    fn broken_pyramid() -> Pyramid {
+        let mut pyramid = Pyramid::new(WINDOW, 2);
+        pyramid.add((0, 2), (0, 0), Rgb::WHITE, 1.0);
+        (0..1100).for_each(|_| pyramid.merge(&pyramid.clone()));
+        pyramid
+    }
+
+    #[test]
+    fn counts_of_iterations_that_overflow_are_refused() {
+        for iterations in [0, 1, crate::film::MAX_ITERATIONS + 1, u64::MAX] {
+            let (film, _) = saved();
+            let mut value = serde_json::to_value(&film).unwrap();
+            value["iterations"] = iterations.into();
+            let film: Film = serde_json::from_value(value).unwrap();
+            assert!(!film.is_plausible(), "{iterations}");
+        }
+        assert!(saved().0.is_plausible());
     }
 }

@@ -5,7 +5,7 @@ use super::stats::Clock;
 use super::{JobError, OutputRequest, Plan, PreparedJob, RenderRequest, RenderStats, Rendered, Stop, aov};
 use crate::film::pyramid::PyramidLayer;
 use crate::film::{Film, Pyramid};
-use crate::image::{Layer, OutputFormat, Picture, atomic_write, write_picture};
+use crate::image::{Layer, OutputFormat, Picture, atomic_write, check_writable, write_picture};
 use crate::math::Rgb;
 use crate::scene::SceneDesc;
 use std::path::{Path, PathBuf};
@@ -41,10 +41,21 @@ impl RenderRequest {
             OutputFormat::of(path).map_err(JobError::input)?;
         }
         let outputs = self.output_files();
-        let saved = self.checkpoint_file();
+        // A file that is resumed from is an input, unless it is the one that is saved to as well.
+        let saved = self.checkpoint.as_deref();
         let resumed = self.resume.as_deref().filter(|resume| !saved.is_some_and(|saved| is_same_file(saved, resume)));
         outputs.check_inputs([self.scene.file.as_path()].into_iter().chain(resumed))?;
-        outputs.check()
+        outputs.check()?;
+        match (saved, resumed) {
+            // It is saved to only once it has been found to be a checkpoint.
+            (None, Some(path)) => check_writable(path).map_err(|e| {
+                JobError::File(format!(
+                    "{}: cannot be written: {e}; name another file with --checkpoint",
+                    path.display()
+                ))
+            }),
+            _ => Ok(()),
+        }
     }
 
     /// Checks that no output is a file that the scene was read from.
@@ -55,16 +66,16 @@ impl RenderRequest {
         self.output_files().check_inputs(desc.files.iter().map(PathBuf::as_path))
     }
 
-    /// The file that checkpoints are saved to.
+    /// The file that checkpoints are saved to: the one to go on from, if no other is named.
     pub fn checkpoint_file(&self) -> Option<&Path> {
-        self.checkpoint.as_deref()
+        self.checkpoint.as_deref().or(self.resume.as_deref())
     }
 
     fn output_files(&self) -> OutputFiles {
         let mut files = OutputFiles::default();
         self.outputs.pictures.iter().for_each(|path| files.add("-o", path));
         self.outputs.stats.iter().for_each(|path| files.add("--stats", path));
-        self.checkpoint_file().into_iter().for_each(|path| files.add("--checkpoint", path));
+        self.checkpoint.iter().for_each(|path| files.add("--checkpoint", path));
         if let Some(pyramid) = &self.outputs.pyramid {
             files.add_folder("--pyramid", &pyramid.folder, &[PYRAMID_RAW, PYRAMID_WEIGHTED, PYRAMID_SHEET]);
         }
@@ -102,7 +113,7 @@ pub(super) fn write_all(prepared: &PreparedJob, plan: &Plan, rendered: Rendered,
     {
         failures.push(e);
     }
-    failures.extend(rendered.checkpoint_error.map(JobError::from));
+    failures.extend(rendered.checkpoint_error);
     Finished { stats, written, stop: rendered.outcome.stop, failures }
 }
 

@@ -4,11 +4,13 @@ use super::{Aov, Budget, ErrorTarget, JobError, Method, MethodRequest};
 use crate::load::LoadOptions;
 use crate::prepared::PrepareOptions;
 use crate::scene::{Diagnostics, SceneDesc};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Samples per pixel if neither the request nor the scene says.
 const DEFAULT_SPP: u64 = 64;
+/// Least wall time between two checkpoints if the request does not say.
+pub const DEFAULT_CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A scene file and how it is read.
 #[derive(Clone, Debug)]
@@ -36,8 +38,10 @@ pub struct RenderRequest {
     pub time: Option<Duration>,
     /// Error at which the render ends.
     pub error_target: Option<ErrorTarget>,
-    /// File to save checkpoints to.
+    /// File to save checkpoints to; none: the checkpoint to go on from, if there is one.
     pub checkpoint: Option<PathBuf>,
+    /// Least wall time between two checkpoints; none: [`DEFAULT_CHECKPOINT_INTERVAL`].
+    pub checkpoint_interval: Option<Duration>,
     /// Checkpoint to go on from.
     pub resume: Option<PathBuf>,
     /// Files to write at the end.
@@ -81,6 +85,8 @@ pub struct Plan {
     pub error_target: Option<ErrorTarget>,
     /// File to save checkpoints to.
     pub checkpoint: Option<PathBuf>,
+    /// Least wall time between two checkpoints.
+    pub checkpoint_interval: Duration,
     /// Checkpoint to go on from.
     pub resume: Option<PathBuf>,
     /// Length in edges of the longest paths of the pyramid, if one is kept.
@@ -101,7 +107,8 @@ impl RenderRequest {
         Ok(Plan {
             budget: Budget { iterations: self.spp.or(default), time: self.time },
             error_target: self.error_target,
-            checkpoint: self.checkpoint.clone(),
+            checkpoint: self.checkpoint_file().map(Path::to_owned),
+            checkpoint_interval: self.checkpoint_interval.unwrap_or(DEFAULT_CHECKPOINT_INTERVAL),
             resume: self.resume.clone(),
             pyramid_edges: self.outputs.pyramid.as_ref().map(|p| p.max_edges),
             ..Plan::new(method, self.seed)
@@ -118,6 +125,7 @@ impl Plan {
             budget: Budget::default(),
             error_target: None,
             checkpoint: None,
+            checkpoint_interval: DEFAULT_CHECKPOINT_INTERVAL,
             resume: None,
             pyramid_edges: None,
         }

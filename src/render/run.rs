@@ -1,6 +1,7 @@
 //! The run step: estimators are made or restored, iterate, are saved, and become one picture.
 
 use super::error_target::{UntilError, half_seeds};
+use super::files::write_or_rescue;
 use super::iterations::{Outcome, Schedule, run_iterations};
 use super::schedule::{Alternate, total_iterations};
 use super::stats::ErrorEstimate;
@@ -11,9 +12,6 @@ use crate::prepared::PreparedScene;
 use std::borrow::Cow;
 use std::path::Path;
 use std::time::{Duration, Instant};
-
-/// Wall time between checkpoints.
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// Result of a run.
 pub struct Rendered {
@@ -26,7 +24,7 @@ pub struct Rendered {
     /// Estimated error, if the plan has an error target.
     pub error: Option<ErrorEstimate>,
     /// Failure of the last checkpoint.
-    pub checkpoint_error: Option<CheckpointError>,
+    pub checkpoint_error: Option<JobError>,
 }
 
 impl Rendered {
@@ -66,7 +64,7 @@ pub fn run(scene: &PreparedScene, plan: &Plan, runtime: Runtime) -> Result<Rende
         if total_iterations(&estimators) == 0 {
             return Err(JobError::Interrupted);
         }
-        let checkpoint_error = checkpoints.save(&estimators).err();
+        let checkpoint_error = checkpoints.save_last(&estimators);
         let error = plan.error_target.zip(until_error).map(|(target, until)| ErrorEstimate {
             measure: target.key,
             target: target.value,
@@ -115,6 +113,8 @@ struct Checkpoints<'a> {
     path: Option<&'a Path>,
     /// Identity of the render, if checkpoints are saved or resumed.
     identity: Option<RenderIdentity>,
+    /// Least wall time between two of them.
+    interval: Duration,
     last: Instant,
 }
 
@@ -124,6 +124,7 @@ impl Checkpoints<'_> {
         Checkpoints {
             path: plan.checkpoint.as_deref(),
             identity: wanted.then(|| RenderIdentity::new(scene, plan)),
+            interval: plan.checkpoint_interval,
             last: Instant::now(),
         }
     }
@@ -131,7 +132,7 @@ impl Checkpoints<'_> {
     /// Saves if the last checkpoint is old enough. A failure is reported by the last one alone: until then the disk
     /// may have room again.
     fn save_if_due(&mut self, estimators: &[Estimator]) {
-        if self.last.elapsed() > CHECKPOINT_INTERVAL {
+        if self.last.elapsed() >= self.interval {
             let _ = self.save(estimators);
             self.last = Instant::now();
         }
@@ -143,5 +144,11 @@ impl Checkpoints<'_> {
             (Some(path), Some(identity)) => identity.save(path, estimators),
             _ => Ok(()),
         }
+    }
+
+    /// Saves at the end, to another place if the file cannot be written; returns the failure.
+    fn save_last(&self, estimators: &[Estimator]) -> Option<JobError> {
+        let (path, identity) = (self.path?, self.identity.as_ref()?);
+        write_or_rescue(path, |path| identity.save(path, estimators)).err()
     }
 }

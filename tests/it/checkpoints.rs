@@ -132,3 +132,29 @@ fn damaged_checkpoints_are_refused() {
     let earlier = b"{\"format\":\"lightsieve-checkpoint-2\",\"integrator\":\"two-stage\"}\n0123456701234567";
     refused("an earlier version", earlier, "version 2 of the format");
 }
+
+#[test]
+fn a_resumed_render_goes_on_saving_to_its_file() {
+    let sandbox = Sandbox::new();
+    sandbox.run("render scene.xml --spp 2 --checkpoint c").expect(0, &[]);
+    sandbox.run("render scene.xml --spp 5 --resume c").expect(0, &["5 samples"]);
+    // Nothing is left to render: the file had all five.
+    sandbox.run("render scene.xml --spp 5 --resume c -o five.pfm --stats s.json").expect(0, &[]);
+    assert!(stats(&sandbox, "s.json")["rays"].as_object().unwrap().is_empty());
+    let five = sandbox.read("c");
+    sandbox.run("render scene.xml --spp 7 --resume c --checkpoint d").expect(0, &["7 samples"]);
+    assert!(sandbox.read("c") == five, "the other file was named");
+    sandbox.run("render scene.xml --spp 7 --resume d -o seven.pfm").expect(0, &[]);
+    sandbox.run("render scene.xml --spp 7 -o whole.pfm").expect(0, &[]);
+    assert!(sandbox.read("seven.pfm") == sandbox.read("whole.pfm"));
+}
+
+#[test]
+fn a_checkpoint_that_cannot_be_written_at_the_end_goes_to_another_place() {
+    let sandbox = Sandbox::new();
+    std::os::unix::fs::symlink("/dev/full", sandbox.path("full")).unwrap();
+    sandbox.run("render scene.xml --spp 2 --checkpoint full").expect(3, &["full: ", "lightsieve-rescued-"]);
+    let names = std::fs::read_dir(sandbox.path("")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+    let rescued = names.into_iter().find(|n| n.contains("rescued")).unwrap();
+    sandbox.run(&format!("render scene.xml --spp 4 --resume {rescued}")).expect(0, &["4 samples"]);
+}

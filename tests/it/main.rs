@@ -12,6 +12,7 @@ mod fallback;
 mod furnace;
 mod image_metrics;
 mod images;
+mod kills;
 mod measure;
 mod outputs;
 mod rays;
