@@ -68,6 +68,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
     pub(super) fn emitter_to_lens(&mut self, u: [f32; 2], tracer: &mut Tracer, sampler: &mut PathSampler) {
         if self.purpose.splats.is_none()
             || !self.rules.mis.techniques.uses(1, 1)
+            || self.rules.mis.light_limits.max_edges < 1
             || !self.out.emitter.can_be_hit
             || self.rules.hide_emitters
         {

@@ -13,6 +13,25 @@ fn mean(image: &Image) -> f64 {
 }
 
 #[test]
+fn no_edges_are_black_and_one_edge_is_the_lamp_for_every_integrator() {
+    let sandbox = Sandbox::new();
+    // The camera looks up at the lamp.
+    sandbox.write_box_with("lamp.xml", "target=\"0, 0, -1\"", "target=\"0, 0.95, 0\"");
+    for spec in lightsieve::integrators::REGISTRY {
+        let name = spec.name;
+        let lit = |depth: u32| {
+            let render = format!("render lamp.xml -i {name} --max-depth {depth} --spp 16 -o a.pfm --quiet");
+            sandbox.run(&render).expect(0, &[]);
+            let image = image(&sandbox, "a.pfm");
+            let pixels = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
+            pixels.filter(|&(x, y)| image.rgb(x, y).luminance() > 0.0).count()
+        };
+        assert_eq!(lit(0), 0, "{name}");
+        assert!(lit(1) > 0, "{name}");
+    }
+}
+
+#[test]
 fn a_pyramid_is_written() {
     let sandbox = Sandbox::new();
     sandbox
