@@ -12,7 +12,8 @@ use std::time::Duration;
 #[command(
     version,
     max_term_width = 110,
-    after_help = "Exit codes: 0 fine, 1 non-finite samples under --strict or a regression found by bench, \
+    after_help = "Exit codes: 0 fine, 1 non-finite samples under --strict, a required error target that is not reached, or a \
+                  regression found by bench, \
                   2 bad usage or input, 3 files cannot be read or written, 130 interrupted.\n\
                   The same seed gives the same bits for any number of threads; --time may stop at another iteration \
                   each time."
@@ -117,11 +118,14 @@ pub(crate) struct RenderArgs {
     /// two halves with seeds of their own, whose difference tells
     #[arg(long, value_name = "MEASURE=VALUE", value_parser = ErrorTarget::parse)]
     pub error_target: Option<ErrorTarget>,
+    /// Exit with code 1 if the error target is not reached
+    #[arg(long, requires = "error_target")]
+    pub require_error_target: bool,
     /// Threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
     /// Exposure of PNG output in stops
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true, value_parser = exposure)]
     pub exposure: f32,
     /// Write statistics as JSON
     #[arg(long, value_name = "FILE")]
@@ -133,7 +137,7 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "DIR")]
     pub pyramid: Option<PathBuf>,
     /// Longest paths of the pyramid, in edges
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u64).range(1..=32))]
+    #[arg(long, value_name = "N", default_value_t = 6, requires = "pyramid", value_parser = clap::value_parser!(u64).range(1..=32))]
     pub pyramid_depth: u64,
     /// Save a checkpoint every minute and at the end
     #[arg(long, value_name = "FILE")]
@@ -275,6 +279,12 @@ fn crop(text: &str) -> Result<[u32; 4], String> {
     numbers(text, ',', "x,y,width,height")
 }
 
+/// Stops of exposure: beyond 100 every value is black or white.
+pub(super) fn exposure(text: &str) -> Result<f32, String> {
+    let stops = text.parse().ok().filter(|v: &f32| v.abs() <= 100.0);
+    stops.ok_or_else(|| "expected a number of stops between -100 and 100".into())
+}
+
 pub(super) fn duration(text: &str) -> Result<Duration, String> {
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let unit = match &text[digits.len()..] {
@@ -307,6 +317,14 @@ mod tests {
         assert_eq!(duration("250ms"), Ok(Duration::from_millis(250)));
         for bad in ["", "s", "-3s", "0", "3 parsecs", "nan", "inf"] {
             assert!(duration(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn exposures_are_finite() {
+        assert_eq!(exposure("-2.5"), Ok(-2.5));
+        for bad in ["nan", "inf", "-inf", "1e9", "bright"] {
+            assert!(exposure(bad).is_err(), "{bad}");
         }
     }
 }

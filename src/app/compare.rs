@@ -2,6 +2,8 @@
 
 use super::Failure;
 use super::cli::CompareArgs;
+use super::environment::Environment;
+use super::numbers::number;
 use crate::image::error_image::{DECADES, ErrorView, error_image};
 use crate::image::metrics::{Colours, colours};
 use crate::image::z_test::{ZTest, z_test};
@@ -44,7 +46,8 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
         outputs.check()?;
     }
     let ((image, variance), (reference, reference_variance)) = (read(&args.image)?, read(&args.reference)?);
-    let report = compare(&image, &reference).map_err(Failure::input)?;
+    let pool = Environment::new(None, args.quiet)?.pool;
+    let report = pool.install(|| compare(&image, &reference)).map_err(Failure::input)?;
     let (a, b, _) = colours(&image, &reference).map_err(Failure::input)?;
     let z = z_test((&a, variance.as_deref()), (&b, reference_variance.as_deref()));
     if let Some(path) = &args.error_image {
@@ -80,7 +83,7 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
         ("HDR-FLIP", report.hdr_flip, "worst of the exposures"),
         ("mean ratio", report.mean_ratio, "mean image / mean reference"),
     ] {
-        out!("{name:16}{value:<14.6e}{formula}");
+        out!("{name:16}{:<14}{formula}", number(value));
     }
     out!("{:16}{:<14}pixels left out", "non-finite", report.non_finite);
     if let Some(z) = z {

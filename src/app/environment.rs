@@ -1,6 +1,7 @@
 //! Surroundings of every command that loads a scene: threads, Ctrl-C, and messages on the terminal.
 
 use super::{Failure, report};
+use crate::render::memory::check_available;
 use crate::render::{Observer, Progress, Runtime};
 use crate::scene::Diagnostics;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,7 +22,11 @@ impl Environment {
     pub fn new(threads: Option<u32>, quiet: bool) -> Result<Environment, Failure> {
         let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         let threads = threads.map_or_else(all, |n| n as usize);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::input)?;
+        check_available(&format!("{threads} threads: their stack"), threads as u64 * STACK_BYTES)?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK_BYTES as usize).build();
+        let pool = pool.map_err(|e| {
+            Failure::Input(format!("{threads} threads cannot be started: {e}; choose fewer with --threads"))
+        })?;
         Ok(Environment { threads, pool, console: Console::new(quiet) })
     }
 
@@ -50,6 +55,8 @@ pub(crate) struct Console {
     bar: Mutex<ProgressBar>,
 }
 
+/// Bytes of a thread's stack, reserved as it starts.
+const STACK_BYTES: u64 = 2 << 20;
 /// Steps of the progress bar.
 const BAR_STEPS: f64 = 1000.0;
 

@@ -1,6 +1,6 @@
 //! Arguments of the measuring commands.
 
-use super::cli::{Query, duration, pair, size};
+use super::cli::{Query, duration, exposure, pair, size};
 use crate::measure::curve::{MEASURES, Measure};
 use clap::Args;
 use std::path::PathBuf;
@@ -107,7 +107,7 @@ pub(crate) struct MergeArgs {
     #[arg(short, long, value_name = "FILE", required = true)]
     pub output: Vec<PathBuf>,
     /// Exposure of PNG output in stops
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true, value_parser = exposure)]
     pub exposure: f32,
     /// Print nothing but errors
     #[arg(long)]

@@ -21,10 +21,12 @@ mod compare;
 mod config;
 mod converge;
 mod environment;
+mod excerpt;
 mod info;
 mod list;
 mod measure_args;
 mod merge;
+mod numbers;
 mod output;
 mod processor;
 mod profile;
@@ -49,6 +51,8 @@ pub(crate) enum Failure {
     NonFinite(u64),
     /// `bench --against`: so many rows are worse than they were.
     Regression(usize),
+    /// `--require-error-target`: the estimated error is not below the target.
+    Target,
     /// Ctrl-C; everything was written.
     Interrupted,
 }
@@ -69,13 +73,14 @@ impl Failure {
             Failure::Input(text) | Failure::Io(text) => note!("error: {text}"),
             Failure::NonFinite(n) => note!("error: {n} samples were not finite (--strict)"),
             Failure::Regression(n) => note!("error: worse than the baseline beyond noise: {n} rows"),
+            Failure::Target => note!("error: the error target was not reached (--require-error-target)"),
             Failure::Interrupted => note!("interrupted"),
         }
     }
 
     fn exit_code(&self) -> u8 {
         match self {
-            Failure::NonFinite(_) | Failure::Regression(_) => 1,
+            Failure::NonFinite(_) | Failure::Regression(_) | Failure::Target => 1,
             Failure::Input(_) => 2,
             Failure::Io(_) => 3,
             Failure::Interrupted => 130,

@@ -4,8 +4,8 @@ use super::Failure;
 use super::cli::RenderArgs;
 use super::config::print_plan;
 use super::environment::Environment;
-use crate::render::{JobError, Observer, RenderRequest, RenderStats, Stop, job};
-use std::path::PathBuf;
+use super::numbers::number;
+use crate::render::{Finished, JobError, Observer, RenderRequest, Stop, job};
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let environment = Environment::new(args.threads, args.quiet)?;
@@ -13,9 +13,12 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if args.print_config {
         return print_config(&request, &environment);
     }
+    if request.keeps_nothing() {
+        return Err(Failure::Input("nothing of the render would be kept: name an output file (-o FILE)".into()));
+    }
     let finished = job::render(&request, environment.runtime())?;
     if !args.quiet {
-        summarise(&finished.stats, &finished.written);
+        summarise(&finished, args);
     }
     if let Some(failure) = last_failure(finished.failures) {
         return Err(failure);
@@ -26,7 +29,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if args.scene.strict && finished.stats.non_finite > 0 {
         return Err(Failure::NonFinite(finished.stats.non_finite));
     }
-    Ok(())
+    match &finished.stats.error {
+        Some(error) if args.require_error_target && !error.is_reached() => Err(Failure::Target),
+        _ => Ok(()),
+    }
 }
 
 /// Prints all failures but the last, which decides the exit code.
@@ -48,7 +54,8 @@ fn print_config(request: &RenderRequest, environment: &Environment) -> Result<()
     Ok(())
 }
 
-fn summarise(stats: &RenderStats, written: &[PathBuf]) {
+fn summarise(finished: &Finished, args: &RenderArgs) {
+    let stats = &finished.stats;
     note!(
         "{} samples per pixel in {:.2} s ({:.2} Mrays/s, {:.0} % of the time in ray queries, {})",
         stats.iterations,
@@ -57,12 +64,20 @@ fn summarise(stats: &RenderStats, written: &[PathBuf]) {
         100.0 * stats.ray_query_share,
         stats.backend
     );
+    if let (Some(time), 1) = (args.time, finished.new_iterations) {
+        note!(
+            "a single iteration takes {:.2} s: --time {:.2}s leaves room for no other",
+            stats.wall_s,
+            time.as_secs_f64()
+        );
+    }
     for line in &stats.notes {
         note!("{}: {line}", stats.integrator);
     }
     if let Some(e) = &stats.error {
-        let estimate = e.estimate.map_or("not known".into(), |v| format!("{v:.3e}"));
-        note!("{} by estimate {estimate} (target {:e})", e.measure, e.target);
+        let estimate = e.estimate.map_or("not known".into(), number);
+        let reached = if e.is_reached() { "" } else { ": not reached" };
+        note!("{} by estimate {estimate} (target {}){reached}", e.measure, number(e.target));
     }
     if stats.non_finite > 0 {
         note!("warning: {} samples were not finite and were left out; the first:", stats.non_finite);
@@ -70,10 +85,7 @@ fn summarise(stats: &RenderStats, written: &[PathBuf]) {
             note!("  pixel {},{} iteration {}: {}", p.x, p.y, p.iteration, p.source.name());
         }
     }
-    for path in written {
+    for path in &finished.written {
         note!("wrote {}", path.display());
-    }
-    if written.is_empty() {
-        note!("no output file was asked for (-o FILE)");
     }
 }

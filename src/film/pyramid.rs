@@ -39,6 +39,11 @@ impl Pyramid {
         k * (k + 1) / 2 - 1 + s
     }
 
+    /// Number of techniques with paths of up to `max_edges` edges.
+    pub fn techniques_up_to(max_edges: usize) -> usize {
+        Pyramid::number(max_edges + 1, 0)
+    }
+
     /// Adds what the technique (s, t) found for a pixel of the full picture. Longer paths and other pixels are left
     /// out, and values that are not finite, which the film reports.
     pub fn add(&mut self, (s, t): (usize, usize), (x, y): (u32, u32), raw: Rgb, weight: f32) {

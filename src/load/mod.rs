@@ -50,6 +50,13 @@ pub struct CameraOptions {
     pub resolution: Option<[u32; 2]>,
 }
 
+impl CameraOptions {
+    /// True if anything but the film is chosen.
+    fn is_given(&self) -> bool {
+        self.origin.is_some() || self.target.is_some() || self.up.is_some() || self.fov.is_some()
+    }
+}
+
 /// Why a scene could not be loaded.
 #[derive(Clone, Debug)]
 pub struct LoadFailure {
@@ -100,6 +107,10 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<(SceneDesc, Diag
             None
         }
     };
+    if ending == "xml" && options.camera.is_given() {
+        let d = Diagnostic::error("load::camera-options", "options for the camera have no effect on a scene file");
+        report.push(d.help("a scene file (.xml) has a camera of its own; the options are for models (.obj, .ply)"));
+    }
     if let Some(scene) = &mut scene {
         scene.path = path.to_path_buf();
         report.opened(path);

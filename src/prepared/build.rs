@@ -107,7 +107,9 @@ fn window([width, height]: [u32; 2], crop: Option<[u32; 4]>) -> Result<[u32; 4],
         return Err(PrepareError::Film(format!("a picture of {width} x {height} pixels has nothing to render")));
     }
     if u64::from(width) * u64::from(height) > 1 << 31 {
-        return Err(PrepareError::Film(format!("a picture of {width} x {height} pixels is too large")));
+        return Err(PrepareError::Film(format!(
+            "a picture of {width} x {height} pixels is too large: at most 2^31 pixels can be rendered"
+        )));
     }
     let Some([x, y, w, h]) = crop else { return Ok([0, 0, width, height]) };
     let inside = |at: u32, size: u32, all: u32| size > 0 && at.checked_add(size).is_some_and(|end| end <= all);

@@ -68,7 +68,7 @@ pub(super) struct History {
 /// If a file cannot be read or is wrong.
 pub fn load(request: &SceneRequest, runtime: Runtime) -> Result<LoadedScene, JobError> {
     let mut clock = Clock::default();
-    let (desc, diagnostics) = clock.time(|| load_scene(&request.file, &request.options))?;
+    let (desc, diagnostics) = clock.time(|| runtime.pool.install(|| load_scene(&request.file, &request.options)))?;
     runtime.observer.diagnostics(&diagnostics);
     let (file, seconds) = (request.file.clone(), clock.total().as_secs_f64());
     Ok(LoadedScene { file, desc, diagnostics: Diagnostics::default(), seconds })

@@ -8,6 +8,7 @@ pub mod estimator;
 pub mod files;
 pub mod iterations;
 pub mod job;
+pub mod memory;
 pub mod method;
 pub mod output;
 pub mod request;

@@ -18,6 +18,8 @@ pub struct Finished {
     pub written: Vec<PathBuf>,
     /// Reason for the end of the iterations.
     pub stop: Stop,
+    /// Iterations of this run.
+    pub new_iterations: u64,
     /// Failures to write a file or a checkpoint; one file that cannot be written does not cost the others.
     pub failures: Vec<JobError>,
 }
@@ -40,6 +42,7 @@ impl RenderRequest {
         for path in &self.outputs.pictures {
             OutputFormat::of(path).map_err(JobError::input)?;
         }
+        self.check_effects()?;
         let outputs = self.output_files();
         // A file that is resumed from is an input, unless it is the one that is saved to as well.
         let saved = self.checkpoint.as_deref();
@@ -55,6 +58,33 @@ impl RenderRequest {
                 ))
             }),
             _ => Ok(()),
+        }
+    }
+
+    /// True if nothing of the render would be kept: no picture, statistics, pyramid or checkpoint is written.
+    pub fn keeps_nothing(&self) -> bool {
+        let OutputRequest { pictures, stats, pyramid, .. } = &self.outputs;
+        pictures.is_empty() && stats.is_none() && pyramid.is_none() && self.checkpoint_file().is_none()
+    }
+
+    /// Refuses options that would have no effect.
+    fn check_effects(&self) -> Result<(), JobError> {
+        let OutputRequest { pictures, exposure, aovs, pyramid, .. } = &self.outputs;
+        let has = |format| pictures.iter().any(|path| OutputFormat::of(path).is_ok_and(|f| f == format));
+        let refusals = [
+            (!aovs.is_empty() && !has(OutputFormat::Exr), "--aov has no effect without an EXR file (-o FILE.exr)"),
+            (
+                *exposure != 0.0 && !has(OutputFormat::Png) && pyramid.is_none(),
+                "--exposure has no effect without a PNG file (-o FILE.png)",
+            ),
+            (
+                self.checkpoint_interval.is_some() && self.checkpoint_file().is_none(),
+                "--checkpoint-interval has no effect without --checkpoint or --resume",
+            ),
+        ];
+        match refusals.into_iter().find(|(refused, _)| *refused) {
+            Some((_, reason)) => Err(JobError::Input(reason.into())),
+            None => Ok(()),
         }
     }
 
@@ -114,7 +144,7 @@ pub(super) fn write_all(prepared: &PreparedJob, plan: &Plan, rendered: Rendered,
         failures.push(e);
     }
     failures.extend(rendered.checkpoint_error);
-    Finished { stats, written, stop: rendered.outcome.stop, failures }
+    Finished { stats, written, stop: rendered.outcome.stop, new_iterations: rendered.outcome.iterations, failures }
 }
 
 /// A layer of red, green and blue.

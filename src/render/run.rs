@@ -3,6 +3,7 @@
 use super::error_target::{UntilError, half_seeds};
 use super::files::write_or_rescue;
 use super::iterations::{Outcome, Schedule, run_iterations};
+use super::memory::FilmMemory;
 use super::schedule::{Alternate, total_iterations};
 use super::stats::ErrorEstimate;
 use super::{CheckpointError, Estimator, JobError, Plan, RenderIdentity, Runtime};
@@ -40,9 +41,11 @@ impl Rendered {
 /// Runs a plan: one estimator, or two halves if there is an error target.
 ///
 /// # Errors
-/// If a checkpoint cannot be resumed, or the run was interrupted before its first iteration: an earlier picture is
+/// If there is not enough memory, a checkpoint cannot be resumed, or the run was interrupted before its first iteration: an earlier picture is
 /// worth more than a black one.
 pub fn run(scene: &PreparedScene, plan: &Plan, runtime: Runtime) -> Result<Rendered, JobError> {
+    let films = if plan.error_target.is_some() { 2 } else { 1 };
+    FilmMemory { window: scene.window, films, pyramid_edges: plan.pyramid_edges }.check()?;
     runtime.pool.install(|| {
         let mut checkpoints = Checkpoints::new(scene, plan);
         let mut estimators = estimators(scene, plan, &checkpoints)?;

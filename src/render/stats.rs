@@ -60,6 +60,13 @@ pub struct ErrorEstimate {
     pub seeds: [u64; 2],
 }
 
+impl ErrorEstimate {
+    /// True if the estimated error is below the target.
+    pub fn is_reached(&self) -> bool {
+        self.estimate.is_some_and(|estimate| estimate < self.target)
+    }
+}
+
 /// The scene in numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneStats {

@@ -127,7 +127,7 @@ fn bad_definitions() {
     let sandbox = Sandbox::new();
     refused(&sandbox, "scene.xml -D spp=some", 2, &["scene.xml:13:49", "expected a whole number"]);
     refused(&sandbox, "scene.xml -D spp", 2, &["name=value"]);
-    sandbox.run("render scene.xml -D spq=3").expect(0, &["unused-definition", "spq"]);
+    sandbox.run("render scene.xml -D spq=3 -o out.pfm").expect(0, &["unused-definition", "spq"]);
 }
 
 #[test]

@@ -121,7 +121,7 @@ fn techniques_are_switched_by_name() {
     sandbox.run("render scene.xml -i bdpt --spp 2 -p techniques=*:1 -o a.pfm --quiet").expect(0, &[]);
     sandbox.run("render scene.xml -i light --spp 2 -o b.pfm --quiet").expect(0, &[]);
     assert_eq!(sandbox.read("a.pfm"), sandbox.read("b.pfm"));
-    sandbox.run("render scene.xml -i bdpt -p techniques=1-2").expect(2, &["techniques = 1-2", "light:eye"]);
+    sandbox.run("render scene.xml -o a.pfm -i bdpt -p techniques=1-2").expect(2, &["techniques = 1-2", "light:eye"]);
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod image_metrics;
 mod images;
 mod kills;
 mod measure;
+mod options;
 mod outputs;
 mod rays;
 mod regression;
