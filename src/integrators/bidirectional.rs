@@ -7,6 +7,7 @@ use crate::bidir::{AllocationOptimizer, BidirSettings, Bidirectional, Connection
 use crate::film::{Film, Pyramid};
 use crate::mis::{Heuristic, LightSharing, Techniques};
 use crate::path::PathLimits;
+use crate::prepared::Features;
 use crate::ray::RayStats;
 
 /// The settings that all bidirectional methods have parameters for, with the balance heuristic.
@@ -23,6 +24,21 @@ pub fn settings(params: &Params, techniques: Techniques) -> BidirSettings {
         light_limits: limits,
         hide_emitters: params.bool("hide_emitters"),
     }
+}
+
+/// The limitation of a method that lights what the camera sees by connections alone, with the limitation `other`.
+///
+/// The expectation is right, but samples that meet a lobe of roughness α have about the probability α²: what is missing
+/// without them is not in the estimated variance either. With α = 0.003 light tracing of a small picture brings 97 % of
+/// the light after 1,000 iterations and 99.5 % after 49,000.
+pub fn with_narrow_lobes(features: Features, other: Option<String>) -> Option<String> {
+    let narrow = features.contains(Features::NEARLY_SPECULAR).then(|| {
+        "surfaces of a roughness up to 0.01, and rough glass of an index near 1, are too dark until very many samples \
+         are taken: connections hardly ever meet their narrow lobes"
+            .to_owned()
+    });
+    let all: Vec<String> = other.into_iter().chain(narrow).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
 /// [`settings`] of methods that draw connections from many light sub-paths, where eye sub-paths may end sooner at

@@ -136,6 +136,7 @@ fn features(
         f.set(Features::TEXTURES, m.textured);
         f.set(Features::MASKS, m.passes_through);
         f.set(Features::SPECULAR, m.delta);
+        f.set(Features::NEARLY_SPECULAR, m.nearly_specular);
         f.set(Features::SHADING_NORMALS, !mesh.normals.is_empty());
     }
     for (_, light) in lights.iter() {

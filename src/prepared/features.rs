@@ -34,6 +34,8 @@ features! {
     CROP = 8, "crop";
     /// Some surface emits.
     AREA_LIGHTS = 9, "area-lights";
+    /// Some material scatters into lobes so narrow that connections hardly ever meet them.
+    NEARLY_SPECULAR = 10, "nearly-specular";
 }
 
 impl Features {

@@ -142,6 +142,12 @@ impl Roughness {
     pub fn is_anisotropic(&self) -> bool {
         self.alpha_u != self.alpha_v
     }
+
+    /// True if a lobe is so narrow that connections hardly ever meet it: α of 0.01 or less along a tangent.
+    pub fn is_nearly_specular(&self) -> bool {
+        let narrow = |alpha: &ScalarDesc| matches!(alpha, ScalarDesc::Constant(v) if *v <= 0.01);
+        narrow(&self.alpha_u) || narrow(&self.alpha_v)
+    }
 }
 
 /// Complex refractive index η + iκ of a conductor, relative to the exterior. A perfect mirror has η = 0 and κ = 1.

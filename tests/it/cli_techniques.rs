@@ -13,6 +13,28 @@ fn mean(image: &Image) -> f64 {
 }
 
 #[test]
+fn methods_that_only_connect_warn_of_narrow_lobes() {
+    let sandbox = Sandbox::new();
+    let grey =
+        "<bsdf type=\"diffuse\">\n            <rgb name=\"reflectance\" value=\"$red, 0.5, 0.4\"/>\n        </bsdf>";
+    let warned = |bsdf: &str, integrator: &str| {
+        sandbox.write_box_with("rough.xml", grey, bsdf);
+        let run = sandbox.run(&format!("render rough.xml -i {integrator} --spp 1 -o a.pfm")).expect(0, &[]);
+        run.stderr.contains("narrow lobes")
+    };
+    let metal = |alpha: &str| {
+        format!(
+            "<bsdf type=\"roughconductor\"><string name=\"material\" value=\"Al\"/><float name=\"alpha\" value=\"{alpha}\"/></bsdf>"
+        )
+    };
+    for integrator in ["light", "importance-caching"] {
+        assert!(warned(&metal("0.001"), integrator), "{integrator}");
+        assert!(!warned(&metal("0.1"), integrator), "{integrator}");
+    }
+    assert!(!warned(&metal("0.001"), "bdpt"));
+}
+
+#[test]
 fn no_edges_are_black_and_one_edge_is_the_lamp_for_every_integrator() {
     let sandbox = Sandbox::new();
     // The camera looks up at the lamp.

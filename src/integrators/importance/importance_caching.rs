@@ -26,9 +26,10 @@ pub static IMPORTANCE_CACHING: IntegratorSpec = IntegratorSpec {
     ],
     unbiased: true,
     limitations: |features| {
-        (features.contains(Features::SPECULAR) || features.contains(Features::MASKS)).then(|| {
+        let specular = (features.contains(Features::SPECULAR) || features.contains(Features::MASKS)).then(|| {
             "what the camera sees in mirrors, and through glass or masks, stays black: only its first hit is connected to lights".into()
-        })
+        });
+        bidirectional::with_narrow_lobes(features, specular)
     },
     build: |params| {
         let mut techniques = Techniques::none();

@@ -21,9 +21,10 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
     params: &[&[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS]],
     unbiased: true,
     limitations: |features| {
-        (features.contains(Features::SPECULAR) || features.contains(Features::MASKS)).then(|| {
+        let specular = (features.contains(Features::SPECULAR) || features.contains(Features::MASKS)).then(|| {
             "what the camera sees in mirrors, and through glass or masks, stays black: no connection from a light can reach it".into()
-        })
+        });
+        bidirectional::with_narrow_lobes(features, specular)
     },
     build: |params| {
         let mut techniques = Techniques::none();

@@ -82,6 +82,10 @@ impl Model for RoughConductor {
         params.roughness.is_anisotropic()
     }
 
+    fn is_nearly_specular(params: &RoughConductorParams) -> bool {
+        params.roughness.is_nearly_specular()
+    }
+
     fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
         match half_vector(&self.facets, a, b) {
             None => (Rgb::BLACK, 0.0),

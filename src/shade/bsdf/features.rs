@@ -7,6 +7,8 @@ pub struct Features {
     pub textured: bool,
     /// Some lobe has discrete directions (mirrors, glass, masks).
     pub delta: bool,
+    /// Some lobe has a density, and is so narrow that connections hardly ever meet it.
+    pub nearly_specular: bool,
     /// Some lobe has a density: connections and light samples can reach it.
     pub smooth: bool,
     /// Light crosses the surface and is refracted or passes a pane.
@@ -43,6 +45,7 @@ impl Features {
         Features {
             textured: self.textured || o.textured,
             delta: self.delta || o.delta,
+            nearly_specular: self.nearly_specular || o.nearly_specular,
             smooth: self.smooth || o.smooth,
             transmissive: self.transmissive || o.transmissive,
             passes_through: self.passes_through || o.passes_through,

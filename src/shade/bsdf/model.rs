@@ -45,6 +45,11 @@ pub(super) trait Model: Copy {
         false
     }
 
+    /// Some lobe is so narrow that connections hardly ever meet it.
+    fn is_nearly_specular(_params: &Self::Params) -> bool {
+        false
+    }
+
     /// Scatters nothing at any point.
     fn is_black(_params: &Self::Params) -> bool {
         false
@@ -82,6 +87,7 @@ pub(super) fn features_of<M: Model>(params: &M::Params) -> Features {
     let transmissive = M::transmits(params);
     Features {
         delta: M::DELTA,
+        nearly_specular: M::is_nearly_specular(params),
         smooth: M::SMOOTH,
         scatters: true,
         transmissive,

@@ -80,6 +80,9 @@ impl RoughDielectric {
     }
 }
 
+/// Indices nearer to one than this refract light by less than a narrow lobe is wide, whatever the roughness.
+const NEAR_ONE: f32 = 0.01;
+
 impl Model for RoughDielectric {
     type Params = RoughDielectricParams;
     type Textured = RoughDielectricParams<Textured>;
@@ -108,6 +111,10 @@ impl Model for RoughDielectric {
 
     fn is_oriented(params: &RoughDielectricParams) -> bool {
         params.roughness.is_anisotropic()
+    }
+
+    fn is_nearly_specular(params: &RoughDielectricParams) -> bool {
+        params.roughness.is_nearly_specular() || (params.eta - 1.0).abs() < NEAR_ONE
     }
 
     fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
