@@ -49,6 +49,9 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         print(&measured.rows, verdicts.as_deref());
     }
     session.say(&measured.load.sentence());
+    if let Some(warning) = measured.load.warning() {
+        note!("warning: {warning}{}", if verdicts.is_some() { ", and so do verdicts on them" } else { "" });
+    }
     if let Some(path) = &args.save {
         let text = to_json(&measured)?;
         write_or_rescue(path, |path| {

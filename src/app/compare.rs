@@ -8,8 +8,8 @@ use crate::image::error_image::{DECADES, ErrorView, error_image};
 use crate::image::metrics::{Colours, colours};
 use crate::image::z_test::{ZTest, z_test};
 use crate::image::{
-    Encoding, ExrFile, Image, ImageError, ImageFault, Layer, OutputFormat, Picture, Report, compare, read_image,
-    write_picture,
+    Encoding, ExrFile, Image, ImageError, ImageFault, Layer, OutputFormat, Picture, Pixels, Report, compare,
+    read_image, write_picture,
 };
 use crate::render::OutputFiles;
 use serde::Serialize;
@@ -37,6 +37,20 @@ fn read(path: &Path) -> Result<(Image, Option<Colours>), Failure> {
     Ok((image, layers.and_then(|f| f.colours("variance"))))
 }
 
+/// Pixels of an eight-bit picture that are white in some channel where a picture of floats is brighter than white.
+fn clipped_pixels(eight_bits: &Image, floats: &Image) -> Option<usize> {
+    if matches!(eight_bits.pixels, Pixels::F32(_)) || !matches!(floats.pixels, Pixels::F32(_)) {
+        return None;
+    }
+    let (width, height) = (eight_bits.width.min(floats.width), eight_bits.height.min(floats.height));
+    let is_clipped = |&(x, y): &(u32, u32)| {
+        let (a, b) = (eight_bits.rgb(x, y).to_array(), floats.rgb(x, y).to_array());
+        a.iter().zip(b).any(|(a, b)| *a >= 1.0 && b > 1.0)
+    };
+    let clipped = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(is_clipped).count();
+    (clipped > 0).then_some(clipped)
+}
+
 pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
     if let Some(path) = &args.error_image {
         OutputFormat::of(path).map_err(Failure::input)?;
@@ -46,6 +60,17 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
         outputs.check()?;
     }
     let ((image, variance), (reference, reference_variance)) = (read(&args.image)?, read(&args.reference)?);
+    for (one, other, names) in
+        [(&image, &reference, [&args.image, &args.reference]), (&reference, &image, [&args.reference, &args.image])]
+    {
+        if let Some(n) = clipped_pixels(one, other).filter(|_| !args.quiet) {
+            let [one, other] = names.map(|path| path.display());
+            note!(
+                "warning: {n} pixels of {one} are clipped to eight bits where {other} is brighter: the differences \
+                 there are not errors of the render"
+            );
+        }
+    }
     let pool = Environment::new(None, args.quiet)?.pool;
     let report = pool.install(|| compare(&image, &reference)).map_err(Failure::input)?;
     let (a, b, _) = colours(&image, &reference).map_err(Failure::input)?;

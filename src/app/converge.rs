@@ -3,7 +3,8 @@
 use super::Failure;
 use super::environment::Environment;
 use super::measure_args::ConvergeArgs;
-use super::session::{SceneMethods, Session, command_line, reference_failure, to_json, write_text};
+use super::session::{SceneMethods, Session, command_line, is_complete, reference_failure, to_json, write_text};
+use crate::measure::consensus::doubt;
 use crate::measure::converge::{EqualTimeTask, Run, converge};
 use crate::measure::curve::csv;
 use crate::measure::reference::Reference;
@@ -45,7 +46,15 @@ pub(crate) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
             &Comparison { args, path, scene: &scene, reference: &reference, seeds: &seeds, baseline: &baseline },
         )?;
         session.say(&format!("\n{}: {}", study.scene, study.load.sentence()));
+        study.load.warning().iter().for_each(|warning| session.say(&format!("warning: {warning}")));
         session.say(&study.reference.sentence());
+        let trusted = scene.methods.iter().filter(|m| is_complete(m, &scene.scene)).map(|m| m.label.as_str());
+        if let Some(warning) = doubt(&study.runs, &trusted.collect::<Vec<_>>(), &reference.pixels) {
+            session.say(&format!("warning: {warning}"));
+        }
+        for method in study.single_samples() {
+            session.say(&format!("warning: {method}: --time leaves room for a single sample per pixel only"));
+        }
         if !args.measure.json {
             for line in study.end_table().lines().iter().chain(&[String::new()]).chain(&study.speed_table().lines()) {
                 out!("{line}");

@@ -109,6 +109,10 @@ impl Observer for Console {
         }
     }
 
+    fn note(&self, text: &str) {
+        self.say(text);
+    }
+
     fn warning(&self, text: &str) {
         self.say(&format!("warning: {text}"));
     }

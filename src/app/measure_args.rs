@@ -12,6 +12,9 @@ pub(crate) struct MeasureArgs {
     /// Integrators, each with parameters if wanted: path,bdpt,bdpt:heuristic=power,max_depth=6 [default: all]
     #[arg(short, long, value_name = "NAMES")]
     pub integrators: Option<String>,
+    /// Parameter of all methods that have it
+    #[arg(short, long, value_name = "KEY=VALUE", value_parser = pair)]
+    pub param: Vec<(String, String)>,
     /// Set a variable of the scene file
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = pair)]
     pub define: Vec<(String, String)>,
@@ -47,7 +50,8 @@ pub(crate) struct ReferenceArgs {
     /// Samples per pixel of such a reference instead
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub reference_spp: Option<u64>,
-    /// Integrator of such a reference, with parameters if wanted [default: the first that is measured and unbiased]
+    /// Integrator of such a reference, with parameters if wanted [default: the best of the unbiased ones that are measured,
+    /// by short renders]
     #[arg(long, value_name = "NAME")]
     pub reference_integrator: Option<String>,
 }
@@ -109,6 +113,9 @@ pub(crate) struct MergeArgs {
     /// Exposure of PNG output in stops
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true, value_parser = exposure)]
     pub exposure: f32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
     /// Print nothing but errors
     #[arg(long)]
     pub quiet: bool,

@@ -51,6 +51,7 @@ pub(crate) fn run(args: &ProfileArgs) -> Result<(), Failure> {
         }
     }
     session.say(&found.load.sentence());
+    found.load.warning().iter().for_each(|warning| session.say(&format!("warning: {warning}")));
     if let Some(folder) = &args.report {
         session.say(&format!("wrote {}", write_text(folder, JSON, &to_json(&found)?)?.display()));
         for (name, pixels) in [(COST, map.cost_picture()), (BLOCKED, map.blocked_picture())] {

@@ -33,8 +33,8 @@ pub(crate) struct SceneMethods {
     pub name: String,
     pub scene: PreparedScene,
     pub methods: Vec<Method>,
-    /// Method that renders the reference, if there is a suitable one.
-    pub reference_method: Option<Method>,
+    /// Methods of which the best renders the reference; none if none is suitable.
+    pub reference_methods: Vec<Method>,
 }
 
 impl<'a> Session<'a> {
@@ -64,7 +64,7 @@ impl<'a> Session<'a> {
         let loaded = job::load(&self.args.scene_request(path), runtime)?;
         self.outputs.check_inputs(loaded.desc.files.iter().map(PathBuf::as_path))?;
         let methods = self.methods.iter().map(|m| resolve(m, &loaded.desc)).collect::<Result<Vec<_>, _>>()?;
-        let reference_method = match references.and_then(|r| r.reference_integrator.as_ref()) {
+        let named_method = match references.and_then(|r| r.reference_integrator.as_ref()) {
             Some(text) => Some(resolve(&self.one_method(text)?, &loaded.desc)?),
             None => None,
         };
@@ -76,9 +76,10 @@ impl<'a> Session<'a> {
                 self.say(&format!("warning: {}: {limitation}", method.label));
             }
         }
-        let complete = |m: &&Method| m.spec.unbiased && m.limitation(&scene).is_none();
-        let reference_method = reference_method.or_else(|| methods.iter().find(complete).cloned());
-        Ok(SceneMethods { name, scene, methods, reference_method })
+        let complete = |m: &&Method| is_complete(m, &scene);
+        let all_complete = || methods.iter().filter(complete).cloned().collect();
+        let reference_methods = named_method.map_or_else(all_complete, |method| vec![method]);
+        Ok(SceneMethods { name, scene, methods, reference_methods })
     }
 
     fn one_method(&self, text: &str) -> Result<MethodRequest, Failure> {
@@ -89,17 +90,16 @@ impl<'a> Session<'a> {
 
     /// The reference of a scene from the cache, or rendered now.
     pub fn reference(&self, scene: &SceneMethods, args: &ReferenceArgs) -> Result<Reference, Failure> {
-        let Some(method) = &scene.reference_method else {
+        if scene.reference_methods.is_empty() {
             return Err(Failure::Input(format!(
                 "no unbiased method renders all of {}: name one with --reference-integrator, or a --reference",
                 scene.name
             )));
-        };
+        }
         let time = args.reference_time.or(args.reference_spp.is_none().then_some(REFERENCE_TIME));
         let budget = Budget { iterations: args.reference_spp, time };
-        self.say(&format!("{}: reference by {}", scene.name, method.label));
         let folder = args.cache.clone().unwrap_or_else(cache_folder);
-        let task = ReferenceTask { scene: &scene.scene, name: &scene.name, method, budget };
+        let task = ReferenceTask { scene: &scene.scene, name: &scene.name, methods: &scene.reference_methods, budget };
         Reference::cached(&task, &folder, self.environment.runtime()).map_err(reference_failure)
     }
 
@@ -109,16 +109,33 @@ impl<'a> Session<'a> {
     }
 }
 
+/// True if the method's expectation is the whole light of the scene.
+pub(crate) fn is_complete(method: &Method, scene: &PreparedScene) -> bool {
+    method.spec.unbiased && method.limitation(scene).is_none()
+}
+
 /// Reads methods, which must exist, and gives them the parameters that hold for all methods.
 fn methods(args: &MeasureArgs, text: &str) -> Result<Vec<MethodRequest>, Failure> {
     let mut methods = parse_methods(text).map_err(Failure::Input)?;
+    let mut used = vec![false; args.param.len()];
     for method in &mut methods {
         method.max_depth = args.max_depth;
-        if let Some(name) = &method.integrator {
-            find_integrator(name)?;
+        let Some(name) = &method.integrator else { continue };
+        let spec = find_integrator(name)?;
+        // A method's own parameters come after those of all methods.
+        let mut own = std::mem::take(&mut method.params);
+        for (pair, used) in args.param.iter().zip(&mut used) {
+            if spec.has_param(&pair.0) {
+                method.params.push(pair.clone());
+                *used = true;
+            }
         }
+        method.params.append(&mut own);
     }
-    Ok(methods)
+    match args.param.iter().zip(used).find(|(_, used)| !used) {
+        Some(((key, _), _)) => Err(Failure::Input(format!("-p {key}: none of the methods has this parameter"))),
+        None => Ok(methods),
+    }
 }
 
 /// Diagnostics about the scene's own integrator block would repeat for each method, and are left out.

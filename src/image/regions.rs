@@ -11,7 +11,7 @@ use serde::Serialize;
 /// r the reference's.
 ///
 /// Blocks at the right and lower borders can be smaller; blocks count by their pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RegionErrors {
     /// Blocks of 8 × 8 pixels.
     pub relmse_8x8: f64,

@@ -62,6 +62,13 @@ impl IntegratorSpec {
     }
 }
 
+impl IntegratorSpec {
+    /// True if it has a parameter of that name, or had one of that name earlier.
+    pub fn has_param(&self, name: &str) -> bool {
+        self.params().any(|p| p.name == name || p.aliases.iter().any(|alias| alias.name == name))
+    }
+}
+
 /// The integrator of that name or alias.
 pub fn find(name: &str) -> Option<&'static IntegratorSpec> {
     REGISTRY.iter().find(|s| s.name == name || s.aliases.contains(&name)).copied()

@@ -113,8 +113,8 @@ pub struct SpeedUp {
     pub baseline_seconds: Option<f64>,
     /// Baseline's seconds over the method's.
     pub ratio: Option<f64>,
-    /// Smallest and largest ratio over seeds, each with its own error to reach if there is no target; none if not all
-    /// get there.
+    /// Smallest and largest of `ratio` and the ratios of the seeds, each with its own error to reach if there is no
+    /// target; none if not all get there.
     pub spread: Option<[f64; 2]>,
 }
 
@@ -147,8 +147,11 @@ pub fn speed_ups(
                 Some(time_to_reach(&base, error)? / time_to_reach(&own, error)?)
             })
             .collect();
+        let ratio = baseline_seconds.zip(seconds).map(|(b, s)| b / s);
+        // The mean curve need not lie between the curves of the seeds at an error that is not theirs.
         let spread = of_seeds.filter(|r| !r.is_empty()).map(|ratios| {
-            [ratios.iter().copied().fold(f64::INFINITY, f64::min), ratios.iter().copied().fold(0.0, f64::max)]
+            let all = || ratios.iter().copied().chain(ratio);
+            [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)]
         });
         SpeedUp {
             method: method.clone(),
@@ -156,7 +159,7 @@ pub fn speed_ups(
             target: error,
             seconds,
             baseline_seconds,
-            ratio: baseline_seconds.zip(seconds).map(|(b, s)| b / s),
+            ratio,
             spread,
         }
     };
@@ -220,6 +223,20 @@ mod tests {
         // A firefly late on: the early times below the target do not count.
         assert!((time_to_reach(&[(1.0, 0.1), (2.0, 4.0), (3.0, 1.0)], 1.0).unwrap() - 3.0).abs() < 1e-12);
         assert_eq!(time_to_reach(&[], 1.0), None);
+    }
+
+    #[test]
+    fn a_range_contains_its_mean() {
+        // The two seeds end at very different errors, and so does the mean of their curves.
+        let runs = [
+            run("a", 1, |n| 1.0 / n, 1.0),
+            run("a", 2, |n| 100.0 / n, 1.0),
+            run("b", 1, |n| 0.3 / n.sqrt(), 2.0),
+            run("b", 2, |n| 90.0 / (n * n), 2.0),
+        ];
+        let found = speed_ups(&runs, &["b".to_owned()], "a", MEASURES[0], None).remove(0);
+        let ([low, high], ratio) = (found.spread.unwrap(), found.ratio.unwrap());
+        assert!(low <= ratio && ratio <= high, "{low} {ratio} {high}");
     }
 
     #[test]

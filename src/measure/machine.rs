@@ -106,7 +106,19 @@ impl LoadWatch {
     }
 }
 
+/// Share of all processor time from which on other processes disturb a measurement of time.
+const DISTURBING: f64 = 0.05;
+
 impl Load {
+    /// A warning if other processes took so much processor time that measured times say little.
+    pub fn warning(&self) -> Option<String> {
+        let others = self.others.filter(|share| *share > DISTURBING)?;
+        Some(format!(
+            "other programs took {:.0} % of the processors: times of this measurement say little",
+            100.0 * others
+        ))
+    }
+
     /// As a sentence.
     pub fn sentence(&self) -> String {
         let number = |v: Option<f64>| v.map_or("unknown".into(), |v| format!("{v:.2}"));

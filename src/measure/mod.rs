@@ -7,7 +7,9 @@
 //! one HTML file.
 
 pub mod bench;
+pub mod choice;
 pub mod converge;
+pub mod consensus;
 pub mod curve;
 pub mod machine;
 pub mod merge;

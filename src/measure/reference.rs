@@ -1,6 +1,7 @@
 //! References: the pictures that errors are measured against. A rendered reference is kept in a cache under the hash
 //! of its scene and settings.
 
+use super::choice::{Choice, PILOTS, choose};
 use crate::image::{Encoding, ExrFile, read_image, write_picture};
 use crate::math::hash::mix64;
 use crate::prepared::PreparedScene;
@@ -34,8 +35,8 @@ pub struct ReferenceFacts {
     pub iterations: Option<String>,
     /// Seeds.
     pub seeds: Option<String>,
-    /// Error of the reference itself, from its variance layer. Samples are stratified over iterations, so that this
-    /// is an upper estimate.
+    /// Error of the reference itself, by estimate from its variance layer. Samples are stratified over iterations,
+    /// which makes the estimate too large; light that no sample met is not in it.
     pub own: Option<OwnError>,
     /// Pixels that are not finite; errors leave them out.
     pub non_finite: u64,
@@ -81,8 +82,8 @@ pub struct ReferenceTask<'a> {
     pub scene: &'a PreparedScene,
     /// Name of the scene.
     pub name: &'a str,
-    /// Method, which should be unbiased and render all of the scene.
-    pub method: &'a Method,
+    /// Methods of which the best is taken (see [`choose`]); all should be unbiased and render all of the scene.
+    pub methods: &'a [Method],
     /// Limits of the render.
     pub budget: Budget,
 }
@@ -145,31 +146,21 @@ impl Reference {
     /// The reference of a scene from the cache in `folder`, or rendered and put there.
     ///
     /// # Errors
-    /// If the cache cannot be used, or the render was interrupted.
+    /// If there is no method, the cache cannot be used, or the render was interrupted.
     pub fn cached(task: &ReferenceTask, folder: &Path, runtime: Runtime) -> Result<Reference, ReferenceError> {
-        let ReferenceTask { scene, name, method, budget } = *task;
-        let settings = format!(
-            "{} {} {:?} {:?} {:?} {}",
-            method.spec.name,
-            method.parameters(),
-            scene.film_size,
-            scene.window,
-            budget,
-            env!("CARGO_PKG_VERSION"),
-        );
-        let hash = settings.bytes().fold(scene_hash(scene), |h, b| mix64(h.rotate_left(5) ^ u64::from(b)));
-        let path = folder.join(format!("{name}-{}-{hash:016x}.exr", method.spec.name));
+        let path = folder.join(task.file_name());
         if path.is_file() {
             return Reference::read(&path);
         }
         std::fs::create_dir_all(folder).map_err(|source| ReferenceError::Folder { path: folder.to_owned(), source })?;
-        let plan = Plan { budget, ..Plan::new(method.clone(), REFERENCE_SEED) };
-        let rendered = run::run(scene, &plan, runtime)?;
+        let method = task.choose(runtime)?;
+        let plan = Plan { budget: task.budget, ..Plan::new(method.clone(), REFERENCE_SEED) };
+        let rendered = run::run(task.scene, &plan, runtime)?;
         if rendered.outcome.stop == Stop::Interrupted {
             return Err(JobError::Interrupted.into());
         }
         let metadata = [
-            ("scene", name.to_owned()),
+            ("scene", task.name.to_owned()),
             ("integrator", method.spec.name.to_owned()),
             ("parameters", method.parameters()),
             ("iterations", rendered.film.iterations().to_string()),
@@ -182,6 +173,59 @@ impl Reference {
     }
 }
 
+/// Part of a reference's budget that the choice between several methods takes, about.
+const CHOICE_PART: u32 = 10;
+
+impl ReferenceTask<'_> {
+    /// Name of the reference's file in the cache: a hash of the scene and everything that makes the picture.
+    fn file_name(&self) -> String {
+        let scene = self.scene;
+        let text = |method: &Method| format!("{} {}", method.spec.name, method.parameters());
+        let methods: Vec<String> = self.methods.iter().map(text).collect();
+        let settings = format!(
+            "{} {:?} {:?} {:?} {}",
+            methods.join(", "),
+            scene.film_size,
+            scene.window,
+            self.budget,
+            env!("CARGO_PKG_VERSION"),
+        );
+        let hash = settings.bytes().fold(scene_hash(scene), |h, b| mix64(h.rotate_left(5) ^ u64::from(b)));
+        let method = match self.methods {
+            [one] => one.spec.name,
+            _ => "best",
+        };
+        format!("{}-{method}-{hash:016x}.exr", self.name)
+    }
+
+    /// The best of the methods; the observer hears which it is.
+    fn choose(&self, runtime: Runtime) -> Result<Method, JobError> {
+        let none = || JobError::Input(format!("there is no method to render a reference of {}", self.name));
+        let Some(first) = self.methods.first() else { return Err(none()) };
+        if self.methods.len() == 1 {
+            return Ok(first.clone());
+        }
+        let share = |n: u64| (n / u64::from(CHOICE_PART)).clamp(1, 16);
+        let parts = CHOICE_PART * self.methods.len() as u32 * PILOTS as u32;
+        let budget =
+            Budget { iterations: self.budget.iterations.map(share), time: self.budget.time.map(|t| t / parts) };
+        let Choice { best, confirmed_by } = choose(self.scene, self.methods, budget, runtime)?;
+        let label = |i: usize| self.methods[i].label.as_str();
+        match confirmed_by {
+            Some(other) => {
+                let found = format!("{}: reference by {}, with which {} agrees", self.name, label(best), label(other));
+                runtime.observer.note(&found);
+            }
+            None => runtime.observer.warning(&format!(
+                "{}: the reference is rendered by {}, and no other method agrees with it in short renders",
+                self.name,
+                label(best)
+            )),
+        }
+        Ok(self.methods[best].clone())
+    }
+}
+
 impl ReferenceFacts {
     /// As a sentence.
     pub fn sentence(&self) -> String {
@@ -191,7 +235,11 @@ impl ReferenceFacts {
             None => "made by another program".to_owned(),
         };
         let own = match self.own {
-            Some(e) => format!("its own error is at most about relMSE {:.2e}, MAPE {:.2e}", e.relmse, e.mape),
+            Some(e) => format!(
+                "its own error is about relMSE {:.2e}, MAPE {:.2e} by estimate from its samples, which say nothing of \
+                 light that none of them met",
+                e.relmse, e.mape
+            ),
             None => "its own error is not known (no variance layer)".to_owned(),
         };
         format!("reference {}: {made}; {own}", self.file.display())

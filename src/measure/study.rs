@@ -81,6 +81,15 @@ impl SceneStudy {
         self.speed_ups = measures.flat_map(of).collect();
     }
 
+    /// Methods whose render time was enough for one sample per pixel only.
+    pub fn single_samples(&self) -> Vec<&str> {
+        let single = |m: &&MethodSummary| {
+            let runs = runs_of(&self.runs, &m.label);
+            !runs.is_empty() && runs.iter().all(|r| r.points.last().is_some_and(|p| p.iterations == 1))
+        };
+        self.methods.iter().filter(single).map(|m| m.label.as_str()).collect()
+    }
+
     /// Errors of every method at the end: means over seeds, and half of the spread.
     pub fn end_table(&self) -> Table {
         let head = ["method", "samples", "seconds", "Mrays/s"].map(String::from).to_vec();
@@ -138,7 +147,7 @@ impl SceneStudy {
                 "l1" => own.mae,
                 _ => return None,
             };
-            Some(("error of the reference (upper estimate)".to_owned(), level))
+            Some(("error of the reference (estimate)".to_owned(), level))
         };
         let line = |method: &MethodSummary, measure: Measure| Line {
             name: method.label.clone(),

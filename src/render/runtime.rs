@@ -21,6 +21,9 @@ pub trait Observer: Sync {
     /// New diagnostics about the scene.
     fn diagnostics(&self, _new: &Diagnostics) {}
 
+    /// A fact about the render that is worth knowing.
+    fn note(&self, _text: &str) {}
+
     /// A warning about the render.
     fn warning(&self, _text: &str) {}
 

@@ -206,7 +206,7 @@ fn a_render_with_a_target_says_how_it_went() {
     sandbox.run("render scene.xml --error-target map=0.1").expect(2, &["known: relmse"]);
 }
 
-const QUICK: &str = "--cache cache --reference-spp 64 --time 60ms --seeds 2 --size 20x12";
+const QUICK: &str = "--cache cache --reference-integrator path --reference-spp 64 --time 60ms --seeds 2 --size 20x12";
 
 #[test]
 fn convergence_is_measured_and_reported() {
@@ -400,4 +400,75 @@ fn check_page(page: &str) {
         }
     }
     assert!(open.is_empty(), "not closed: {open:?}");
+}
+
+#[test]
+fn a_reference_that_nobody_names_is_by_a_method_that_another_confirms() {
+    let sandbox = Sandbox::new();
+    let quick = "--cache cache --reference-spp 64 --time 60ms --seeds 2 --size 20x12";
+    let first = sandbox.run(&format!("converge scene.xml -i path,light,bdpt {quick}"));
+    let first = first.expect(0, &["scene: reference by", "agrees", "its own error is about", "by estimate"]);
+    assert!(!first.stderr.contains("at most"), "{}", first.stderr);
+    // It is kept, and not chosen again.
+    let again = sandbox.run(&format!("converge scene.xml -i path,light,bdpt {quick}")).expect(0, &[]);
+    assert!(!again.stderr.contains("reference by"), "{}", again.stderr);
+}
+
+#[test]
+fn methods_that_agree_against_the_reference_are_told() {
+    let sandbox = Sandbox::new();
+    sandbox.run("render scene.xml --size 20x12 --spp 16 --seed 9 -D red=0.1 -o dark.exr").expect(0, &[]);
+    sandbox.run("render scene.xml --size 20x12 --spp 64 --seed 9 -o right.exr").expect(0, &[]);
+    let converge = |reference: &str| {
+        let run = sandbox.run(&format!(
+            "converge scene.xml -i path,bdpt --reference {reference} --time 200ms --seeds 3 --size 20x12"
+        ));
+        run.expect(0, &[]).stderr
+    };
+    let wrong = converge("dark.exr");
+    assert!(wrong.contains("path, bdpt agree with each other and not with the reference"), "{wrong}");
+    assert!(!converge("right.exr").contains("agree with each other"));
+}
+
+#[test]
+fn parameters_hold_for_all_methods_that_have_them() {
+    let sandbox = Sandbox::new();
+    let methods = |arguments: &str| {
+        let run = sandbox.run(&format!("converge scene.xml {arguments} {QUICK} --json")).expect(0, &[]);
+        let found = json(&run.stdout)["scenes"][0]["methods"].clone();
+        found.as_array().unwrap().iter().map(|m| m["parameters"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let found = methods("-i path,bdpt,bdpt:max_depth=2 -p max_depth=3 -p light_paths=1/4");
+    assert!(found[0].contains("max_depth=3") && found[1].contains("max_depth=3"), "{found:?}");
+    assert!(found[1].contains("light_paths=1/4") || found[1].contains("light_paths=0.25"), "{found:?}");
+    assert!(found[2].contains("max_depth=2"), "a method's own parameters win: {found:?}");
+    sandbox.run("profile scene.xml -i path -p light_paths=1/4 --time 30ms").expect(2, &["none of the methods has"]);
+    sandbox.run("profile scene.xml -i path -p max_depth=2 --time 30ms --size 8x8").expect(0, &[]);
+}
+
+#[test]
+fn clipped_pictures_are_told_from_wrong_ones() {
+    let sandbox = Sandbox::new();
+    sandbox.run("render scene.xml -o a.exr -o a.png --exposure 3").expect(0, &[]);
+    sandbox.run("compare a.png a.exr").expect(0, &[]);
+    let lamp = ("target=\"0, 0, -1\"", "target=\"0, 0.95, 0\"");
+    sandbox.write_box_with("lamp.xml", lamp.0, lamp.1);
+    sandbox.run("render lamp.xml -o l.exr -o l.png").expect(0, &[]);
+    for pair in ["l.png l.exr", "l.exr l.png"] {
+        sandbox.run(&format!("compare {pair}")).expect(0, &["pixels of l.png are clipped", "l.exr is brighter"]);
+    }
+    let same = sandbox.run("compare l.exr l.exr").expect(0, &[]);
+    assert!(same.stderr.is_empty(), "{}", same.stderr);
+    let report = json(&sandbox.run("compare --json l.png l.exr").expect(0, &[]).stdout);
+    assert!(report["mean_ratio"].as_f64().is_some());
+}
+
+#[test]
+fn a_merge_is_described_in_json() {
+    let sandbox = Sandbox::new();
+    for seed in [3, 4] {
+        sandbox.run(&format!("render scene.xml --seed {seed} --spp 2 -o {seed}.exr")).expect(0, &[]);
+    }
+    let found = json(&sandbox.run("merge 3.exr 4.exr -o all.exr --json").expect(0, &[]).stdout);
+    assert_eq!(found, json("{\"iterations\": 4, \"seeds\": [\"3\", \"4\"], \"written\": [\"all.exr\"]}"));
 }
