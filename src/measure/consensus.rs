@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn methods_that_agree_against_the_reference_raise_doubt() {
         let all = [runs("path", [0.0, 0.0]), runs("a", [1.0, 1.01]), runs("b", [1.01, 1.0])].concat();
-        let doubt = |methods: &[&str], reference: f64| doubt(&all, methods, &vec![[reference; 3]; 4]);
+        let doubt = |methods: &[&str], reference: f64| doubt(&all, methods, &[[reference; 3]; 4]);
         let black = doubt(&["path", "a", "b"], 0.0).expect("a and b see light");
         assert!(black.starts_with("a, b agree"), "{black}");
         assert!(doubt(&["path", "a", "b"], 0.8).is_some_and(|text| text.contains("1.256 of its")));

@@ -10,6 +10,7 @@ mod cli_techniques;
 mod factors;
 mod fallback;
 mod furnace;
+mod fuzz;
 mod image_metrics;
 mod images;
 mod kills;
