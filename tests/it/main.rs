@@ -22,6 +22,7 @@ mod regression;
 mod resampling;
 mod scale;
 mod scene_files;
+mod stress;
 mod support;
 mod techniques;
 mod weights;
