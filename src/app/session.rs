@@ -8,7 +8,7 @@ use crate::measure::parse_methods;
 use crate::measure::reference::{Reference, ReferenceError, ReferenceTask};
 use crate::prepared::PreparedScene;
 use crate::render::files::write_or_rescue;
-use crate::render::memory::FilmMemory;
+use crate::render::memory::{FilmMemory, check_light_subpaths};
 use crate::render::method::find_integrator;
 use crate::render::{Budget, JobError, Method, MethodRequest, OutputFiles, job};
 use crate::scene::{Diagnostics, SceneDesc};
@@ -70,6 +70,7 @@ impl<'a> Session<'a> {
         };
         let scene = job::prepare(loaded, &self.args.prepare_options(&self.environment), runtime)?.scene;
         FilmMemory { window: scene.window, films: methods.len(), pyramid_edges: None }.check()?;
+        methods.iter().try_for_each(check_light_subpaths)?;
         let name = scene_name(path);
         for method in &methods {
             if let Some(limitation) = method.limitation(&scene) {

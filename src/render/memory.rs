@@ -1,6 +1,6 @@
 //! Memory that a render needs at least, compared with what there is before anything is allocated.
 
-use super::JobError;
+use super::{JobError, Method};
 use crate::film::Pyramid;
 
 /// Bytes of a pixel's sums and sums of squares in a film.
@@ -9,6 +9,12 @@ const FILM_BYTES: u64 = 48;
 const PICTURE_BYTES: u64 = 48;
 /// Bytes of a pixel in the two pictures of a technique.
 const TECHNIQUE_BYTES: u64 = 48;
+
+/// Bytes of a stored light sub-path of one vertex, with its densities and the memory of sorting (as measured: 500 to
+/// 700).
+const SUBPATH_BYTES: u64 = 400;
+/// Parameter of methods that store light sub-paths: how many.
+const PRESAMPLED_PATHS: &str = "presampled_paths";
 
 /// Films that are held at the same time.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +50,17 @@ impl FilmMemory {
         };
         check_available(&what, self.bytes())
     }
+}
+
+/// Compares the need of the light sub-paths that a method is told to store with the memory that is available.
+///
+/// # Errors
+/// If there is less; the message says what is needed.
+pub fn check_light_subpaths(method: &Method) -> Result<(), JobError> {
+    let pairs = method.params.pairs();
+    let given = pairs.iter().find(|(key, _)| *key == PRESAMPLED_PATHS).and_then(|(_, value)| value.parse().ok());
+    let paths: u64 = given.unwrap_or(0);
+    check_available(&format!("{} with {paths} light sub-paths", method.label), paths.saturating_mul(SUBPATH_BYTES))
 }
 
 /// Compares a need in bytes with the memory that is available, where the system tells.

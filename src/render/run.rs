@@ -3,7 +3,7 @@
 use super::error_target::{UntilError, half_seeds};
 use super::files::write_or_rescue;
 use super::iterations::{Outcome, Schedule, run_iterations};
-use super::memory::FilmMemory;
+use super::memory::{FilmMemory, check_light_subpaths};
 use super::schedule::{Alternate, total_iterations};
 use super::stats::ErrorEstimate;
 use super::{CheckpointError, Estimator, JobError, Plan, RenderIdentity, Runtime};
@@ -46,6 +46,7 @@ impl Rendered {
 pub fn run(scene: &PreparedScene, plan: &Plan, runtime: Runtime) -> Result<Rendered, JobError> {
     let films = if plan.error_target.is_some() { 2 } else { 1 };
     FilmMemory { window: scene.window, films, pyramid_edges: plan.pyramid_edges }.check()?;
+    check_light_subpaths(&plan.method)?;
     runtime.pool.install(|| {
         let mut checkpoints = Checkpoints::new(scene, plan);
         let mut estimators = estimators(scene, plan, &checkpoints)?;

@@ -76,6 +76,8 @@ fn memory_and_threads_that_cannot_be_had_are_refused_before_the_render() {
         .expect(2, &["with a pyramid of techniques needs at least"]);
     run_limited(&sandbox, 4_000_000, &format!("{film} 8x8")).expect(0, &[]);
     sandbox.run(&format!("{film} 100000x100000")).expect(2, &["100000 x 100000 pixels is too large"]);
+    let paths = "render scene.xml --threads 2 -o a.pfm --spp 1 -i ris -p presampled_paths=10000000";
+    run_limited(&sandbox, 3_000_000, paths).expect(2, &["ris with 10000000 light sub-paths", "needs at least", "GiB"]);
     let threads = "render scene.xml -o a.pfm --spp 1 --threads";
     run_limited(&sandbox, 600_000, &format!("{threads} 4096")).expect(2, &["4096 threads", "GiB of memory"]);
     run_limited(&sandbox, 4_000_000, &format!("{threads} 16")).expect(0, &[]);
