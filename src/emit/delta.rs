@@ -2,7 +2,7 @@
 
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::{EmitError, in_range};
-use crate::math::warp::{SPHERE_PDF, cone_pdf, square_to_cone, square_to_sphere};
+use crate::math::warp::{SPHERE_PDF, cone_pdf, square_to_cone, square_to_sphere, versine};
 use crate::math::{AreaPdf, DMat4, DVec3, Frame, Rgb, SolidAnglePdf, Vec3};
 use std::f32::consts::PI;
 
@@ -94,12 +94,27 @@ pub struct SpotLight {
     intensity: Rgb,
     cutoff: f32,
     beam: f32,
-    cos_cutoff: f32,
-    cos_beam: f32,
+    /// 1 − cos of `cutoff`: of a narrow cone, the cosine itself is 1 in single precision.
+    versine_cutoff: f32,
+    /// 1 − cos of `beam`.
+    versine_beam: f32,
+}
+
+/// Smallest half angle of a spot in degrees. The spacing of unit vectors in single precision is a hundredth of it.
+const MIN_CUTOFF: f64 = 5e-4;
+
+/// 1 − sin x / x.
+fn one_minus_sinc(x: f64) -> f64 {
+    let x2 = x * x;
+    if x2 < 1e-2 { x2 / 6.0 * (1.0 - x2 / 20.0 * (1.0 - x2 / 42.0 * (1.0 - x2 / 72.0))) } else { 1.0 - x.sin() / x }
 }
 
 impl SpotLight {
-    /// Along +z of the space of `to_world`; half angles in degrees, `beam_width` ≤ `cutoff_angle` < 180.
+    /// Along +z of the space of `to_world`; half angles in degrees, 0.0005 ≤ `cutoff_angle` < 180. A beam wider than the
+    /// cutoff is as wide as the cutoff.
+    ///
+    /// # Errors
+    /// An angle outside of its range, or a transform without an axis.
     pub fn new(
         to_world: DMat4,
         intensity: Rgb,
@@ -108,7 +123,12 @@ impl SpotLight {
         centre: DVec3,
     ) -> Result<SpotLight, EmitError> {
         let cutoff = f64::from(cutoff_angle);
-        in_range("cutoff_angle", cutoff, cutoff > 0.0 && cutoff < 180.0, "between 0 and 180 degrees")?;
+        in_range(
+            "cutoff_angle",
+            cutoff,
+            (MIN_CUTOFF..180.0).contains(&cutoff),
+            "at least 0.0005 and less than 180 degrees",
+        )?;
         in_range("beam_width", f64::from(beam_width), beam_width >= 0.0, "at least 0 degrees")?;
         let position = (to_world.w_axis.truncate() - centre).as_vec3();
         let axis = to_world.z_axis.truncate().try_normalize().ok_or(EmitError::Transform("spot light"))?.as_vec3();
@@ -117,7 +137,8 @@ impl SpotLight {
         }
         let (cutoff, beam) = (cutoff_angle.to_radians(), beam_width.min(cutoff_angle).to_radians());
         let frame = Frame::from_normal(axis.normalize());
-        Ok(SpotLight { position, frame, intensity, cutoff, beam, cos_cutoff: cutoff.cos(), cos_beam: beam.cos() })
+        let [versine_cutoff, versine_beam] = [cutoff, beam].map(|angle| versine(f64::from(angle)) as f32);
+        Ok(SpotLight { position, frame, intensity, cutoff, beam, versine_cutoff, versine_beam })
     }
 
     /// Position, relative to the scene's centre.
@@ -135,24 +156,33 @@ impl SpotLight {
         self.cutoff
     }
 
+    /// 1 − cos of the angle between the axis and the unit direction `wo`: half of the squared chord.
+    fn versine_of(&self, wo: Vec3) -> f32 {
+        0.5 * (wo - self.frame.n).length_squared()
+    }
+
     /// Radiant intensity in the unit direction `wo`.
     pub fn intensity(&self, wo: Vec3) -> Rgb {
-        let cos = self.frame.n.dot(wo);
-        if cos <= self.cos_cutoff {
+        let versine = self.versine_of(wo);
+        if versine >= self.versine_cutoff {
             Rgb::BLACK
-        } else if cos >= self.cos_beam {
+        } else if versine <= self.versine_beam {
             self.intensity
         } else {
-            self.intensity * ((self.cutoff - cos.min(1.0).acos()) / (self.cutoff - self.beam)).clamp(0.0, 1.0)
+            let angle = 2.0 * (0.5 * versine).sqrt().min(1.0).asin();
+            self.intensity * ((self.cutoff - angle) / (self.cutoff - self.beam)).clamp(0.0, 1.0)
         }
     }
 
     /// See [`super::Light::power`].
     pub fn power(&self) -> f32 {
-        // ∫ I dω in closed form: the full cone, and by parts the ramp ∫ (c − θ) / (c − b) sin θ dθ.
+        // ∫ I dω in closed form: the full cone, and by parts the ramp ∫ (c − θ) / (c − b) sin θ dθ. Together that is
+        // 2π (1 − (sin c − sin b) / (c − b)), written with the middle of both angles and half of their difference so
+        // that nothing cancels.
         let (b, c) = (f64::from(self.beam), f64::from(self.cutoff));
-        let ramp = if c > b { b.cos() - (c.sin() - b.sin()) / (c - b) } else { 0.0 };
-        (2.0 * std::f64::consts::PI * (1.0 - b.cos() + ramp)) as f32 * self.intensity.luminance()
+        let (middle, half) = (0.5 * (b + c), 0.5 * (c - b));
+        let share = versine(middle) + middle.cos() * one_minus_sinc(half);
+        (2.0 * std::f64::consts::PI * share) as f32 * self.intensity.luminance()
     }
 
     /// See [`super::Light::sample_direct`].
@@ -162,14 +192,15 @@ impl SpotLight {
 
     /// See [`super::Light::sample_emission`].
     pub fn sample_emission(&self, u_dir: [f32; 2]) -> EmissionSample {
-        let direction = self.frame.to_world(square_to_cone(u_dir, self.cos_cutoff)).normalize();
-        let pdf = SolidAnglePdf(cone_pdf(self.cos_cutoff));
+        let direction = self.frame.to_world(square_to_cone(u_dir, self.versine_cutoff)).normalize();
+        let pdf = SolidAnglePdf(cone_pdf(self.versine_cutoff));
         emission_from_point(self.position, direction, self.intensity(direction), pdf)
     }
 
     /// Density of emission directions per steradian.
     pub fn pdf_direction(&self, wo: Vec3) -> SolidAnglePdf {
-        SolidAnglePdf(if self.frame.n.dot(wo) > self.cos_cutoff { cone_pdf(self.cos_cutoff) } else { 0.0 })
+        let inside = self.versine_of(wo) < self.versine_cutoff;
+        SolidAnglePdf(if inside { cone_pdf(self.versine_cutoff) } else { 0.0 })
     }
 }
 

@@ -87,24 +87,29 @@ pub fn sphere_to_square(v: Vec3) -> [f32; 2] {
     [0.5 * (1.0 - v.z), if phi < 0.0 { phi + 1.0 } else { phi }]
 }
 
-/// Unit square → cone around +z with cosine of half angle `cos_max`, uniform in solid angle.
-pub fn square_to_cone(u: [f32; 2], cos_max: f32) -> Vec3 {
+/// 1 − cos of an angle in radians, without cancellation for small angles.
+pub fn versine(angle: f64) -> f64 {
+    2.0 * (0.5 * angle).sin().powi(2)
+}
+
+/// Unit square → cone around +z, uniform in solid angle. `versine_max` is 1 − cos of the half angle (see [`versine`]).
+pub fn square_to_cone(u: [f32; 2], versine_max: f32) -> Vec3 {
     // 1 − z is sampled rather than z: it keeps its precision for narrow cones.
-    let one_minus_z = u[0] * (1.0 - cos_max);
+    let one_minus_z = u[0] * versine_max;
     let r = (one_minus_z * (2.0 - one_minus_z)).max(0.0).sqrt();
     let (sin, cos) = (2.0 * PI * u[1]).sin_cos();
     Vec3::new(r * cos, r * sin, 1.0 - one_minus_z)
 }
 
 /// Density of [`square_to_cone`] per steradian inside the cone.
-pub fn cone_pdf(cos_max: f32) -> f32 {
-    1.0 / (2.0 * PI * (1.0 - cos_max))
+pub fn cone_pdf(versine_max: f32) -> f32 {
+    1.0 / (2.0 * PI * versine_max)
 }
 
 /// Inverse of [`square_to_cone`].
-pub fn cone_to_square(v: Vec3, cos_max: f32) -> [f32; 2] {
+pub fn cone_to_square(v: Vec3, versine_max: f32) -> [f32; 2] {
     let phi = v.y.atan2(v.x) / (2.0 * PI);
-    [(1.0 - v.z) / (1.0 - cos_max), if phi < 0.0 { phi + 1.0 } else { phi }]
+    [(1.0 - v.z) / versine_max, if phi < 0.0 { phi + 1.0 } else { phi }]
 }
 
 /// Unit square → barycentrics (b1, b2) of a triangle, uniform in area, low distortion (Heitz 2019).
@@ -136,10 +141,10 @@ mod tests {
             prop_assert!(close(disk_to_square(square_to_disk(u)), u));
             prop_assert!(close(cosine_hemisphere_to_square(square_to_cosine_hemisphere(u)), u));
             prop_assert!(close(sphere_to_square(square_to_sphere(u)), u));
-            prop_assert!(close(cone_to_square(square_to_cone(u, c), c), u));
+            prop_assert!(close(cone_to_square(square_to_cone(u, 1.0 - c), 1.0 - c), u));
             prop_assert!(close(triangle_to_square(square_to_triangle(u)), u));
             prop_assert!((square_to_sphere(u).length() - 1.0).abs() < 1e-5);
-            prop_assert!((square_to_cone(u, c).length() - 1.0).abs() < 1e-5);
+            prop_assert!((square_to_cone(u, 1.0 - c).length() - 1.0).abs() < 1e-5);
         }
     }
 
@@ -170,6 +175,6 @@ mod tests {
         assert!((mean(z_sphere) - 1.0 / 3.0).abs() < 1e-3);
         assert!((mean(z_cone) - 0.75).abs() < 1e-3);
         assert!((mean(bary) - 1.0 / 3.0).abs() < 1e-3);
-        assert!((cone_pdf(-1.0) - SPHERE_PDF).abs() < 1e-6);
+        assert!((cone_pdf(2.0) - SPHERE_PDF).abs() < 1e-6);
     }
 }

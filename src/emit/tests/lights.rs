@@ -254,6 +254,36 @@ fn irradiance_from_delta_lights_is_the_inverse_square_law() {
     );
 }
 
+/// The flux of a spot is the integral of its intensity over directions at every cutoff angle, by its power and by its
+/// emission samples.
+#[test]
+fn power_of_a_narrow_spot_is_that_of_a_wide_one() {
+    let at = DVec3::new(0.1, 0.2, 0.3);
+    for beam_share in [1.0, 0.75] {
+        for cutoff in [30.0f32, 3.0, 0.5, 0.1, 0.02, 0.01, 0.003] {
+            let intensity = Rgb::grey((1.0 / (2.0 * (f64::from(cutoff).to_radians() * 0.5).sin().powi(2))) as f32);
+            let turned = DMat4::from_translation(at) * DMat4::from_rotation_x(0.7);
+            let spot = SpotLight::new(turned, intensity, cutoff, cutoff * beam_share, DVec3::ZERO).unwrap();
+            // ∫ by midpoints over the angle, in double precision.
+            let (b, c) = (f64::from(cutoff * beam_share).to_radians(), f64::from(cutoff).to_radians());
+            let n = 4000;
+            let ring = |i: u32| {
+                let angle = c * (f64::from(i) + 0.5) / f64::from(n);
+                let ramp = if angle <= b { 1.0 } else { (c - angle) / (c - b) };
+                2.0 * std::f64::consts::PI * ramp * angle.sin() * c / f64::from(n)
+            };
+            let exact = (0..n).map(ring).sum::<f64>() * f64::from(intensity.g);
+            assert!((f64::from(spot.power()) / exact - 1.0).abs() < 1e-5, "{cutoff}: {} {exact}", spot.power());
+            let light = Light::Spot(Box::new(spot));
+            let mut rng = rng(61);
+            let flux = |_| light.sample_emission([0.5; 2], pair(&mut rng)).map_or(0.0, |s| f64::from(s.flux().g));
+            let mean = (0..20_000).map(flux).sum::<f64>() / 20_000.0;
+            assert!((mean / exact - 1.0).abs() < 0.01, "{cutoff} {beam_share}: {mean} {exact}");
+        }
+    }
+    assert!(SpotLight::new(DMat4::IDENTITY, Rgb::WHITE, 1e-4, 0.0, DVec3::ZERO).is_err());
+}
+
 #[test]
 fn emission_carries_the_power_and_agrees_with_its_densities() {
     for (name, light) in all_lights() {
