@@ -1,6 +1,7 @@
 //! Building a [`PreparedScene`]: place, clean, centre, and hand each part to the room that knows it.
 
 use super::lights::{Extent, all_lights};
+use super::limits::{MAX_REACH, check_instances};
 use super::placing::{PlacedScene, centre};
 use super::{Features, MeshShading, PreparedScene, TriangleTable};
 use crate::emit::{Camera, EmitError, Light, LightSet, PixelFilter};
@@ -42,6 +43,12 @@ pub enum PrepareError {
     /// Materials are impossible; the diagnostics say which.
     #[error("the scene's materials cannot be used")]
     Materials,
+    /// Transforms are beyond single precision; the diagnostics say which.
+    #[error("the scene's transforms cannot be used")]
+    Transforms,
+    /// The scene is larger than single precision can hold.
+    #[error("the scene reaches {0:e} from its centre, which is beyond the range of single precision")]
+    Extent(f32),
 }
 
 impl PreparedScene {
@@ -72,10 +79,11 @@ impl PreparedScene {
         let mut placed = PlacedScene::new(&mut desc, centre, &materials, diagnostics);
         let (lo, hi) = placed.geometry.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
         let radius = lo.abs().max(hi.abs()).length();
+        let camera = Camera::new(&sensor, centre)?;
+        check_range(&placed, &desc, radius.max(camera.position().length()), diagnostics)?;
         let lights = LightSet::new(all_lights(&mut placed, &desc, &textures, Extent { centre, radius })?);
         let PlacedScene { geometry, meshes, instance_normals, .. } = placed;
 
-        let camera = Camera::new(&sensor, centre)?;
         let features =
             features(&desc, &sensor, &materials, &lights, &meshes, window != [0, 0, film_size[0], film_size[1]]);
         let geometry = Arc::new(geometry);
@@ -99,6 +107,21 @@ impl PreparedScene {
             tree_seconds: start.elapsed().as_secs_f64(),
         })
     }
+}
+
+/// Refuses what single precision cannot hold; `reach` is the distance of surfaces and camera from the centre.
+fn check_range(
+    placed: &PlacedScene,
+    desc: &SceneDesc,
+    reach: f32,
+    diagnostics: &mut Diagnostics,
+) -> Result<(), PrepareError> {
+    check_instances(&placed.geometry, &desc.instances, reach, diagnostics);
+    if diagnostics.has_errors() {
+        return Err(PrepareError::Transforms);
+    }
+    // Not a number is out of range as well.
+    if reach < MAX_REACH { Ok(()) } else { Err(PrepareError::Extent(reach)) }
 }
 
 /// The part to render.

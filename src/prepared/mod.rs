@@ -7,6 +7,7 @@
 pub mod build;
 pub mod features;
 mod lights;
+mod limits;
 pub mod mesh;
 mod placing;
 pub mod triangles;

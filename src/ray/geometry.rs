@@ -117,6 +117,16 @@ impl Geometry {
         }
     }
 
+    /// Smallest box around the mesh `mesh` in its own space; `None` if it has no vertices.
+    pub fn mesh_bounds(&self, mesh: u32) -> Option<(Vec3, Vec3)> {
+        union(self.meshes[mesh as usize].positions.iter().map(|&p| (p, p)))
+    }
+
+    /// Smallest box around the meshes `meshes` in their own space; `None` if they have no vertices.
+    pub fn bounds_of(&self, meshes: &[u32]) -> Option<(Vec3, Vec3)> {
+        union(meshes.iter().filter_map(|&mesh| self.mesh_bounds(mesh)))
+    }
+
     /// Smallest box around everything; `None` if there is nothing.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let mut bounds: Option<(Vec3, Vec3)> = None;
@@ -129,4 +139,9 @@ impl Geometry {
         });
         bounds
     }
+}
+
+/// Smallest box around all of `boxes`.
+fn union(boxes: impl Iterator<Item = (Vec3, Vec3)>) -> Option<(Vec3, Vec3)> {
+    boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }

@@ -328,3 +328,23 @@ fn bad_pictures_to_compare() {
     sandbox.run("compare cut.pfm a.pfm").expect(2, &["cut.pfm", "damaged"]);
     sandbox.run("compare a.pfm scene.xml").expect(2, &["scene.xml", "known format"]);
 }
+
+/// Rays in the space of such an instance would be beyond single precision, whatever answers them.
+#[test]
+fn an_instance_scaled_to_nothing_is_refused() {
+    for (scale, query) in [
+        ("value=\"1e-20\"", "embree"),
+        ("value=\"1e-15\"", "obvhs"),
+        ("x=\"1e-20\"", "embree"),
+        ("x=\"1e-20\"", "obvhs"),
+    ] {
+        let sandbox = Sandbox::new();
+        let instance = format!(
+            "<shape type=\"shapegroup\" id=\"g\"><shape type=\"rectangle\"/></shape>\
+             <shape type=\"instance\"><ref id=\"g\"/><transform name=\"to_world\"><scale {scale}/></transform></shape></scene>"
+        );
+        sandbox.write_box_with("scene.xml", "</scene>", &instance);
+        let arguments = format!("scene.xml --query {query}");
+        refused(&sandbox, &arguments, 2, &["scene::bad-transform", "the transform of this instance"]);
+    }
+}
