@@ -61,9 +61,9 @@ mod embree {
             .allowlist_function("rtc(NewDevice|ReleaseDevice|GetDevice.*|SetDevice.*)")
             .allowlist_function("rtc(NewScene|ReleaseScene|CommitScene|SetScene.*|GetSceneBounds)")
             .allowlist_function("rtc(NewGeometry|ReleaseGeometry|CommitGeometry|AttachGeometryByID)")
-            .allowlist_function("rtcSet(SharedGeometryBuffer|GeometryMask|GeometryBuildQuality|GeometryTransform|GeometryInstancedScene|GeometryTimeStepCount)")
+            .allowlist_function("rtcSet(SharedGeometryBuffer|GeometryMask|GeometryUserPrimitiveCount|GeometryUserData|GeometryBoundsFunction|GeometryIntersectFunction|GeometryOccludedFunction|GeometryBuildQuality|GeometryTransform|GeometryInstancedScene|GeometryTimeStepCount)")
             .allowlist_function("rtc(Intersect1|Occluded1|Occluded16)")
-            .allowlist_type("RTC(Ray|Hit|RayHit|Ray16|Error|Bounds|IntersectContext|RayQueryContext|IntersectArguments|OccludedArguments|DeviceProperty|FeatureFlags|RayQueryFlags)")
+            .allowlist_type("RTC(Ray|Hit|RayHit|Ray16|Error|Bounds|IntersectContext|RayQueryContext|IntersectArguments|OccludedArguments|BoundsFunctionArguments|IntersectFunctionNArguments|OccludedFunctionNArguments|DeviceProperty|FeatureFlags|RayQueryFlags)")
             // A newer library may return an unknown value: a Rust enum would make that undefined behaviour.
             .default_enum_style(bindgen::EnumVariation::NewType { is_bitfield: false, is_global: false })
             .bitfield_enum("RTC(SceneFlags|RayQueryFlags|FeatureFlags|IntersectContextFlags)")

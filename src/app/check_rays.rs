@@ -32,7 +32,7 @@ pub(crate) fn run(args: &CheckRaysArgs) -> Result<(), Failure> {
         Ok(())
     };
     check(Backend::Obvhs, args.rays)?;
-    let affordable = BRUTE_WORK / (3 * scene.geometry.triangle_count().max(1) as u64);
+    let affordable = BRUTE_WORK / (3 * (scene.geometry.triangle_count() + scene.geometry.round_count()).max(1) as u64);
     check(Backend::Brute, args.rays.min(affordable))?;
 
     print(&rows, args.json)?;

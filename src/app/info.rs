@@ -79,6 +79,9 @@ fn describe_prepared(scene: &PreparedScene) {
         mib(scene.geometry.bytes() + shading),
         mib(scene.triangles.bytes())
     );
+    if !scene.geometry.round.is_empty() {
+        out!("round       {} spheres, disks and cylinders", scene.geometry.round_count());
+    }
     out!("lights      {} (every emitting triangle is one)", scene.lights.len());
     out!("radius      {:.4}, centre {:.4} {:.4} {:.4}", scene.radius, scene.centre.x, scene.centre.y, scene.centre.z);
     out!("features    {}", scene.features.names().join(", "));

@@ -95,15 +95,17 @@ pub fn for_each_background(scene: &PreparedScene, direction: Vec3, mut each: imp
 }
 
 /// Density per steradian with which next event at the start of `edge` would have drawn the point of the light `id` at
-/// its end, in the unit direction `direction`; `normal` is the light choice normal there.
+/// its end, in the unit direction `direction`; `normal` is the light choice normal there, `ng` the light's own unit
+/// normal at its point.
 #[inline]
 pub fn next_event_pdf(
     scene: &PreparedScene,
     id: LightId,
     edge: &Edge,
     normal: Option<Vec3>,
+    ng: Vec3,
     direction: Vec3,
 ) -> SolidAnglePdf {
     let lights = &scene.lights;
-    lights.get(id).pdf_direct(edge.from, direction, edge.distance) * lights.pmf_light_from(edge.from, normal, id)
+    lights.get(id).pdf_direct(edge.from, ng, direction, edge.distance) * lights.pmf_light_from(edge.from, normal, id)
 }

@@ -132,7 +132,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         }
         let light = scene.lights.get(id);
         let chosen = scene.lights.pmf_light(id);
-        let (position, emission) = light.pdf_emission(-direction);
+        let (position, emission) = light.pdf_emission(end.normal(), -direction);
         let origin_pdf = end.pdf_vertex(position, emission) * chosen;
         let drawn = position.0 * emission.0 * chosen.0;
         let origin = Origin {
@@ -142,7 +142,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
             throughput: end.flux(emitted, -direction, edge.distance, drawn),
         };
         let next_event = if t >= 3 {
-            let direct = next_event_pdf(scene, id, edge, self.normal_before, direction);
+            let direct = next_event_pdf(scene, id, edge, self.normal_before, end.normal(), direction);
             // The direct density is per steradian at z_{t−2}, as the walk's own was before it was converted.
             let walked = edge.pdf_with_survival().0;
             let last = self.pdfs.pdfs.all()[t - 1].pdf_fwd.0;
@@ -302,7 +302,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> WalkHooks for EyeHooks<'_, S, K
         if let Some((light, emitted)) = emitted_at(scene, vertex)
             && let crate::path::Place::Surface { point, .. } = vertex.place
         {
-            let end = scene.lights.get(light).end_at(point.p, point.error);
+            let end = scene.lights.get(light).end_at(point.p, point.error, point.ng);
             let (direction, throughput) = (-vertex.wo, vertex.throughput);
             self.hit(&EmitterHit { light, end, direction, throughput, emitted, edge: vertex.edge });
         }

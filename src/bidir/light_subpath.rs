@@ -168,7 +168,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
             EmitterVertex::Infinite => f32::INFINITY,
             _ => vertex.edge.distance,
         };
-        let direct = light.pdf_direct(p, vertex.wo, distance) * chosen;
+        let direct = light.pdf_direct(p, self.emission.end.normal(), vertex.wo, distance) * chosen;
         next_event_factor(direct, area_jacobian, self.out.pdfs.first(1)[0].pdf_fwd)
     }
 

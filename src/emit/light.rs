@@ -2,9 +2,11 @@
 
 use super::delta::{DirectionalLight, PointLight, SpotLight};
 use super::environment::EnvironmentLight;
+use super::round::RoundLight;
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::triangle::TriangleLight;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
+use crate::scene::RoundKind;
 use crate::spatial::light_tree::{Aabb, Cone, LightBounds};
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -13,6 +15,8 @@ use std::f32::consts::{FRAC_PI_2, PI};
 pub enum Light {
     /// An emitting triangle.
     Triangle(TriangleLight),
+    /// An emitting sphere, disk or cylinder.
+    Round(Box<RoundLight>),
     /// A point that shines in all directions.
     Point(PointLight),
     /// A point that shines into a cone.
@@ -30,6 +34,7 @@ impl Light {
     pub fn sample_direct(&self, from: Vec3, u: [f32; 2]) -> Option<DirectSample> {
         match self {
             Light::Triangle(l) => l.sample_direct(from, u),
+            Light::Round(l) => l.sample_direct(from, u),
             Light::Point(l) => l.sample_direct(from),
             Light::Spot(l) => l.sample_direct(from),
             Light::Directional(l) => l.sample_direct(),
@@ -38,22 +43,25 @@ impl Light {
     }
 
     /// Density per steradian with which [`Light::sample_direct`] draws the unit direction `wi`, along which a ray from
-    /// `from` meets the light after `distance` (infinite for lights at infinity). Zero for delta lights.
+    /// `from` meets the light after `distance` (infinite for lights at infinity), where its unit normal is `ng` (any
+    /// value for lights that are no surfaces). Zero for delta lights.
     #[inline]
-    pub fn pdf_direct(&self, from: Vec3, wi: Vec3, distance: f32) -> SolidAnglePdf {
+    pub fn pdf_direct(&self, from: Vec3, ng: Vec3, wi: Vec3, distance: f32) -> SolidAnglePdf {
         match self {
             Light::Triangle(l) => l.pdf_direct(from, wi, distance),
+            Light::Round(l) => l.pdf_direct(from, ng, wi, distance),
             Light::Environment(l) => l.pdf_direct(wi),
             _ => SolidAnglePdf(0.0),
         }
     }
 
     /// Radiance that leaves the light in the unit direction `wo`; `b` = barycentrics (b1, b2) of the point on a
-    /// triangle, unused by other kinds. Black for delta lights: no ray meets them.
+    /// triangle, code of the point on a round shape, unused by other kinds. Black for delta lights: no ray meets them.
     #[inline]
     pub fn emitted(&self, b: [f32; 2], wo: Vec3) -> Rgb {
         match self {
             Light::Triangle(l) => l.emitted(b, wo),
+            Light::Round(l) => l.emitted(b, wo),
             Light::Environment(l) => l.radiance(-wo),
             _ => Rgb::BLACK,
         }
@@ -63,6 +71,7 @@ impl Light {
     pub fn sample_emission(&self, u_pos: [f32; 2], u_dir: [f32; 2]) -> Option<EmissionSample> {
         match self {
             Light::Triangle(l) => l.sample_emission(u_pos, u_dir),
+            Light::Round(l) => l.sample_emission(u_pos, u_dir),
             Light::Point(l) => Some(l.sample_emission(u_dir)),
             Light::Spot(l) => Some(l.sample_emission(u_dir)),
             Light::Directional(l) => Some(l.sample_emission(u_pos)),
@@ -71,11 +80,13 @@ impl Light {
     }
 
     /// Densities with which [`Light::sample_emission`] draws a ray in the unit direction `wo`: of its origin (per unit
-    /// area, any point of the light or of the disk) and of its direction (per steradian). A delta factor is zero: no
+    /// area, any point of the light or of the disk) and of its direction (per steradian). `ng` is the unit normal at
+    /// the origin (any value for lights that are no surfaces). A delta factor is zero: no
     /// ray found in another way has that exact position or direction.
-    pub fn pdf_emission(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
+    pub fn pdf_emission(&self, ng: Vec3, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
         match self {
             Light::Triangle(l) => l.pdf_emission(wo),
+            Light::Round(l) => l.pdf_emission(ng, wo),
             Light::Point(l) => (AreaPdf(0.0), l.pdf_direction()),
             Light::Spot(l) => (AreaPdf(0.0), l.pdf_direction(wo)),
             Light::Directional(l) => (l.pdf_position(), SolidAnglePdf(0.0)),
@@ -86,12 +97,12 @@ impl Light {
     /// Densities of the emission ray in the direction `wo` from a vertex that is on the light by construction, as those
     /// of [`Light::sample_direct`] are: [`Light::pdf_emission`] with delta factors counted as 1, as MIS weights need
     /// them.
-    pub fn pdf_emission_at_vertex(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
+    pub fn pdf_emission_at_vertex(&self, ng: Vec3, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
         match self {
             Light::Point(l) => (AreaPdf(1.0), l.pdf_direction()),
             Light::Spot(l) => (AreaPdf(1.0), l.pdf_direction(wo)),
             Light::Directional(l) => (l.pdf_position(), SolidAnglePdf(1.0)),
-            _ => self.pdf_emission(wo),
+            _ => self.pdf_emission(ng, wo),
         }
     }
 
@@ -102,7 +113,7 @@ impl Light {
     pub fn pdf_emission_at_sample(&self, sample: &DirectSample) -> (AreaPdf, SolidAnglePdf) {
         match self {
             Light::Environment(l) => (l.pdf_position(), sample.pdf),
-            _ => self.pdf_emission_at_vertex(-sample.wi),
+            _ => self.pdf_emission_at_vertex(sample.end.normal(), -sample.wi),
         }
     }
 
@@ -111,6 +122,7 @@ impl Light {
     pub fn power(&self) -> f32 {
         match self {
             Light::Triangle(l) => l.power(),
+            Light::Round(l) => l.power(),
             Light::Point(l) => l.power(),
             Light::Spot(l) => l.power(),
             Light::Directional(l) => l.power(),
@@ -126,6 +138,15 @@ impl Light {
         }
         let (aabb, cone) = match self {
             Light::Triangle(l) => (Aabb::of(l.corners()), Cone { axis: l.ng(), half_angle: 0.0, emission: FRAC_PI_2 }),
+            Light::Round(l) => {
+                let (lo, hi) = l.shape().bounds();
+                // A disk has one normal; those of the others point all around.
+                let (axis, half_angle) = match l.shape().kind {
+                    RoundKind::Disk => (l.shape().point([0.0; 2]).ng, 0.0),
+                    RoundKind::Sphere | RoundKind::Cylinder => (Vec3::Z, PI),
+                };
+                (Aabb::of([lo, hi]), Cone { axis, half_angle, emission: FRAC_PI_2 })
+            }
             Light::Point(l) => (Aabb::of([l.position()]), Cone { axis: Vec3::Z, half_angle: PI, emission: FRAC_PI_2 }),
             // Nearly uniform inside: the whole cone counts as normals, and nothing lies beyond.
             Light::Spot(l) => {
@@ -156,11 +177,12 @@ impl Light {
         matches!(self, Light::Directional(_))
     }
 
-    /// The light vertex of a ray that met the light at `p` (any value for lights at infinity); `error` bounds the
-    /// rounding error of any component of `p`.
-    pub fn end_at(&self, p: Vec3, error: f32) -> EmitterVertex {
+    /// The light vertex of a ray that met the light at `p` with the unit normal `ng` (any value for lights at
+    /// infinity); `error` bounds the rounding error of any component of `p`.
+    pub fn end_at(&self, p: Vec3, error: f32, ng: Vec3) -> EmitterVertex {
         match self {
             Light::Triangle(l) => EmitterVertex::Surface { p, error, ng: l.ng() },
+            Light::Round(_) => EmitterVertex::Surface { p, error, ng },
             Light::Point(l) => EmitterVertex::Point { p: l.position() },
             Light::Spot(l) => EmitterVertex::Point { p: l.position() },
             Light::Directional(_) | Light::Environment(_) => EmitterVertex::Infinite,

@@ -69,6 +69,15 @@ impl EmitterVertex {
         }
     }
 
+    /// Unit normal of a surface, zero elsewhere.
+    #[inline]
+    pub fn normal(&self) -> Vec3 {
+        match *self {
+            EmitterVertex::Surface { ng, .. } => ng,
+            EmitterVertex::Point { .. } | EmitterVertex::Infinite => Vec3::ZERO,
+        }
+    }
+
     /// The end of a shadow ray at this vertex; `None` at infinity.
     #[inline]
     pub fn segment_end(&self) -> Option<SegmentEnd> {

@@ -42,7 +42,8 @@ pub(super) fn camera(scene: &SceneDesc, options: &CameraOptions) -> Result<Senso
 fn bounding_sphere(scene: &SceneDesc) -> (DVec3, f64) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for shape in &scene.shapes {
-        for p in &scene.meshes[shape.mesh.index()].positions {
+        let Some(mesh) = shape.geometry.mesh() else { continue };
+        for p in &scene.meshes[mesh.index()].positions {
             let p = shape.to_world.transform_point3(p.as_dvec3());
             low = low.min(p);
             high = high.max(p);

@@ -13,7 +13,7 @@ use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, Source, nearest};
 use crate::scene::{
     AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, DiffuseParams, EmitterDesc, EmitterKind, MeshId, SceneDesc,
-    ShapeDesc, Span,
+    ShapeDesc, ShapeGeometry, Span,
 };
 use glam::DMat4;
 use materials::{BumpMap, Origin};
@@ -197,7 +197,7 @@ impl Model {
 
     fn shape(&mut self, mesh: MeshId, bsdf: BsdfId, emission: Option<AreaEmission>, span: Option<Span>) {
         let shape = ShapeDesc {
-            mesh,
+            geometry: ShapeGeometry::Mesh(mesh),
             to_world: DMat4::IDENTITY,
             bsdf: Some(bsdf),
             emission,

@@ -1,6 +1,6 @@
-//! Shapes of a formula as triangles, after Mitsuba's parametrisations. Curved ones have exact vertex normals, and their
-//! radius is a little larger than one so that the *area* of the triangles is the true one: an emitter's power is that
-//! of the formula.
+//! Shapes of a formula as triangles, after Mitsuba's parametrisations; round ones are made of triangles only where they
+//! emit and are stretched. These have exact vertex normals, and their radius is a little larger than one so that the
+//! *area* of the triangles is the true one: an emitter's power is that of the formula.
 
 use super::mesh;
 use crate::scene::MeshDesc;
@@ -16,8 +16,6 @@ pub(super) enum Primitive {
     Cube,
     /// Unit sphere; u = azimuth / 2π from +x, v = angle from +z / π.
     Sphere,
-    /// Unit disk at z = 0, facing +z; u = radius, v = azimuth / 2π.
-    Disk,
     /// Unit radius around z from 0 to 1, without caps, facing outwards; u = azimuth / 2π, v = z.
     Cylinder,
 }
@@ -33,7 +31,6 @@ impl Primitive {
             Primitive::Rectangle => rectangle(),
             Primitive::Cube => cube(),
             Primitive::Sphere => sphere(),
-            Primitive::Disk => disk(),
             Primitive::Cylinder => cylinder(),
         };
         if mirrored {
@@ -135,23 +132,6 @@ fn circle(n: u32) -> impl Iterator<Item = (f64, f64, f64)> {
         let (s, c) = (f64::from(j) * step).sin_cos();
         (radius * c, radius * s, f64::from(j) / f64::from(n))
     })
-}
-
-fn disk() -> MeshDesc {
-    let n = 2 * AROUND;
-    let mut m = MeshDesc { name: "disk".into(), ..MeshDesc::default() };
-    for (x, y, v) in circle(n) {
-        m.positions.push(Vec3::new(x as f32, y as f32, 0.0));
-        m.uvs.push(Vec2::new(1.0, v as f32));
-    }
-    // The centre once for every triangle, so that v does not jump within any.
-    for j in 0..n {
-        m.positions.push(Vec3::ZERO);
-        m.uvs.push(Vec2::new(0.0, (j as f32 + 0.5) / n as f32));
-        m.triangles.push([n + 1 + j, j, j + 1]);
-    }
-    m.normals = vec![Vec3::Z; m.positions.len()];
-    m
 }
 
 fn cylinder() -> MeshDesc {

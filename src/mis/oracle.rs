@@ -86,7 +86,7 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         let path = self.path;
         let light = self.scene.lights.get(path.origin.light);
         let chosen = f64::from(self.scene.lights.pmf_light(path.origin.light).0);
-        let (position, direction) = light.pdf_emission_at_vertex(path.origin.direction);
+        let (position, direction) = light.pdf_emission_at_vertex(path.origin.end.normal(), path.origin.direction);
         let (position, direction) = (f64::from(position.0), f64::from(direction.0));
         let infinite = light.is_infinite();
         let mut pdfs = vec![chosen * if infinite { direction } else { position }];
@@ -127,7 +127,7 @@ impl<F: ConnectionFactor> PathView<'_, F> {
                 return f64::from(chosen.0) / f64::from(self.scene.lights.pmf_light(path.origin.light).0);
             }
             let (d, distance) = path.edge(0);
-            let direct = f64::from(light.pdf_direct(v.point.p, -d, distance).0);
+            let direct = f64::from(light.pdf_direct(v.point.p, path.origin.end.normal(), -d, distance).0);
             f64::from(chosen.0) * direct * self.area_jacobian(0, 0) / origin
         })
     }

@@ -139,6 +139,15 @@ impl Place<'_> {
         self.stored().position()
     }
 
+    /// Unit geometric normal; zero in a medium.
+    #[inline]
+    pub fn normal(&self) -> Vec3 {
+        match self {
+            Place::Surface { point, .. } => point.ng,
+            Place::Medium(medium) => match **medium {},
+        }
+    }
+
     /// See [`StoredPlace::cosine`].
     #[inline]
     pub fn cosine(&self, d: Vec3) -> f32 {

@@ -165,7 +165,7 @@ fn features(
     for (_, light) in lights.iter() {
         f.set(Features::DELTA_LIGHTS, light.is_delta());
         f.set(Features::ENVIRONMENT, light.is_infinite() && !light.is_delta());
-        f.set(Features::AREA_LIGHTS, matches!(light, Light::Triangle(_)));
+        f.set(Features::AREA_LIGHTS, matches!(light, Light::Triangle(_) | Light::Round(_)));
     }
     f.set(Features::THIN_LENS, sensor.aperture_radius > 0.0);
     f.set(Features::INSTANCES, !desc.instances.is_empty());

@@ -1,13 +1,14 @@
-//! The lights of a scene: one for every triangle of an emitting mesh, then the emitters.
+//! The lights of a scene: one for every triangle of an emitting mesh, one for every emitting round shape, then the
+//! emitters.
 
 use super::MeshShading;
 use super::placing::PlacedScene;
 use crate::emit::{
-    DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, PointLight, RadianceTexture, SpotLight,
-    SunSky, SunSkyParams, TexturedEmission, TriangleEmission, TriangleLight,
+    DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, PointLight, RadianceTexture,
+    RoundEmission, RoundLight, SpotLight, SunSky, SunSkyParams, TexturedEmission, TriangleEmission, TriangleLight,
 };
 use crate::math::{DVec3, Rgb, Vec2};
-use crate::ray::MeshBuffers;
+use crate::ray::{MeshBuffers, RoundShape};
 use crate::scene::{AreaEmission, ColorDesc, EmitterDesc, EmitterKind, ImageDesc, SceneDesc};
 use crate::shade::{ColorTexture, SurfacePoint, TextureSet};
 use std::sync::Arc;
@@ -21,7 +22,7 @@ pub(super) struct Extent {
     pub radius: f32,
 }
 
-/// All lights. Each emitting mesh learns the number of the light that is its first triangle.
+/// All lights. Each emitting surface learns the number of its light, a mesh that of its first triangle's.
 pub(super) fn all_lights(
     placed: &mut PlacedScene,
     desc: &SceneDesc,
@@ -29,11 +30,13 @@ pub(super) fn all_lights(
     extent: Extent,
 ) -> Result<Vec<Light>, EmitError> {
     let mut lights = vec![];
-    let meshes = placed.geometry.meshes.iter().zip(&mut placed.meshes);
-    for ((buffers, shading), emission) in meshes.zip(&placed.emission) {
-        if let Some(emission) = emission {
-            shading.first_light = Some(lights.len() as u32);
-            triangle_lights(buffers, shading, emission, textures, &mut lights);
+    let PlacedScene { geometry, meshes, emission, .. } = placed;
+    for (i, (shading, emission)) in meshes.iter_mut().zip(&*emission).enumerate() {
+        let Some(emission) = emission else { continue };
+        shading.first_light = Some(lights.len() as u32);
+        match geometry.round_shape(i as u32) {
+            Some(shape) => lights.push(round_light(shape, emission, textures)),
+            None => triangle_lights(&geometry.meshes[i], shading, emission, textures, &mut lights),
         }
     }
     for emitter in &desc.emitters {
@@ -56,6 +59,23 @@ impl RadianceTexture for Emission {
     }
 }
 
+/// The emission's texture, if it has one.
+fn radiance_texture(emission: &AreaEmission, textures: &TextureSet) -> Option<Arc<dyn RadianceTexture>> {
+    match emission.radiance {
+        ColorDesc::Constant(_) => None,
+        ColorDesc::Texture(_) => Some(Arc::new(Emission(textures.color(emission.radiance)))),
+    }
+}
+
+fn round_light(shape: &RoundShape, emission: &AreaEmission, textures: &TextureSet) -> Light {
+    let radiance = match (radiance_texture(emission, textures), emission.radiance) {
+        (Some(texture), _) => RoundEmission::Textured(texture),
+        (None, ColorDesc::Constant(radiance)) => RoundEmission::Constant(radiance),
+        (None, ColorDesc::Texture(_)) => RoundEmission::Constant(Rgb::BLACK),
+    };
+    Light::Round(Box::new(RoundLight::new(shape.clone(), radiance)))
+}
+
 /// One light for every triangle of an emitting mesh, in the order of the triangles.
 fn triangle_lights(
     buffers: &MeshBuffers,
@@ -64,10 +84,7 @@ fn triangle_lights(
     textures: &TextureSet,
     lights: &mut Vec<Light>,
 ) {
-    let textured: Option<Arc<dyn RadianceTexture>> = match emission.radiance {
-        ColorDesc::Constant(_) => None,
-        ColorDesc::Texture(_) => Some(Arc::new(Emission(textures.color(emission.radiance)))),
-    };
+    let textured = radiance_texture(emission, textures);
     for (i, triangle) in buffers.triangles.iter().enumerate() {
         let emission = match (&textured, emission.radiance) {
             (None, ColorDesc::Constant(radiance)) => TriangleEmission::Constant(radiance),

@@ -1,10 +1,10 @@
-//! Per-vertex data of a mesh and its interpolation.
+//! Data of surfaces for shading: the material and, of meshes, per-vertex data and its interpolation.
 
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::BsdfId;
 use crate::shade::SurfacePoint;
 
-/// Data of a mesh for shading, beside its triangles.
+/// Data of a surface for shading, beside its place.
 #[derive(Debug, Default)]
 pub struct MeshShading {
     /// Unit normals per vertex, or empty.
@@ -15,10 +15,12 @@ pub struct MeshShading {
     pub colors: Vec<Rgb>,
     /// The material; the default one if the file names none.
     pub material: Option<BsdfId>,
-    /// Number of the light that is the first triangle, if the mesh emits; the others follow.
+    /// Number of the light that is the first triangle, if a mesh emits; the others follow. A round shape is one light.
     pub first_light: Option<u32>,
     /// The material depends on the direction of dp/du.
     pub wants_tangents: bool,
+    /// The material or the emission looks something up by texture coordinates.
+    pub wants_uvs: bool,
 }
 
 impl MeshShading {

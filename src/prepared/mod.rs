@@ -19,18 +19,19 @@ pub use triangles::TriangleTable;
 
 use crate::emit::{Camera, LightId, LightSet, PixelFilter};
 use crate::math::{DVec3, Frame, Rgb, Vec2, Vec3};
-use crate::ray::{Geometry, Hit, NONE, RayQuery};
+use crate::ray::round::RoundUv;
+use crate::ray::{Geometry, Hit, NONE, RayQuery, RoundPoint};
 use crate::shade::{Material, MaterialSet, SurfacePoint};
 use glam::{Affine3A, Mat3A};
 use std::sync::Arc;
 
 /// A scene ready to render.
 pub struct PreparedScene {
-    /// Triangles.
+    /// Surfaces.
     pub geometry: Arc<Geometry>,
     /// Who answers questions about rays.
     pub query: Box<dyn RayQuery>,
-    /// Data of each mesh of `geometry` for shading.
+    /// Data of each surface of `geometry` for shading.
     pub meshes: Vec<MeshShading>,
     /// The triangles of `geometry` once more, as hits look them up.
     pub triangles: TriangleTable,
@@ -50,7 +51,7 @@ pub struct PreparedScene {
     pub window: [u32; 4],
     /// The world position that is the origin here.
     pub centre: DVec3,
-    /// Radius of a sphere around the origin that holds every triangle.
+    /// Radius of a sphere around the origin that holds every surface.
     pub radius: f32,
     /// Features of the scene.
     pub features: Features,
@@ -85,11 +86,19 @@ impl PreparedScene {
         self.materials.get(mesh.material)
     }
 
-    /// Interpolated vertex data, and the place of an instance.
+    /// Interpolated vertex data or a point of a round shape, and the place of an instance.
     #[inline(never)]
     fn refine(&self, hit: Hit, point: &mut SurfacePoint) {
         let mesh = &self.meshes[hit.mesh as usize];
-        if !mesh.is_plain() {
+        if let Some(shape) = self.geometry.round_shape(hit.mesh) {
+            let code = [hit.u, hit.v];
+            let RoundPoint { p, error, ng } = shape.point(code);
+            (point.p, point.error, point.ng, point.frame.n) = (p, error, ng, ng);
+            if mesh.wants_uvs {
+                let RoundUv { uv, dpdu, dpdv } = shape.parametrise(code);
+                (point.uv, point.dpdu, point.dpdv) = (uv, dpdu, dpdv);
+            }
+        } else if !mesh.is_plain() {
             let indices = self.geometry.meshes[hit.mesh as usize].triangles[hit.triangle as usize].map(|i| i as usize);
             mesh.interpolate(&indices, [1.0 - hit.u - hit.v, hit.u, hit.v], point);
         }

@@ -1,10 +1,13 @@
-//! Meshes in their places: moved to the scene's centre in double precision, cleaned, and cut into what rays and what
+//! Surfaces in their places: moved to the scene's centre in double precision, cleaned, and cut into what rays and what
 //! shading need.
 
 use super::MeshShading;
 use crate::math::{DVec3, Vec3};
-use crate::ray::{Geometry, Instance, MeshBuffers, SurfaceMask, VertexBuffer};
-use crate::scene::{AreaEmission, BsdfId, ColorDesc, Diagnostic, Diagnostics, MeshDesc, SceneDesc, ShapeDesc};
+use crate::ray::{Geometry, Instance, MeshBuffers, RoundShape, SurfaceMask, VertexBuffer};
+use crate::scene::{
+    AreaEmission, BsdfId, ColorDesc, Diagnostic, Diagnostics, MeshDesc, MeshId, RoundKind, SceneDesc, ShapeDesc,
+    ShapeGeometry,
+};
 use crate::shade::MaterialSet;
 use glam::{Affine3A, DMat3, DMat4, Mat3A};
 use rayon::prelude::*;
@@ -12,9 +15,9 @@ use rayon::prelude::*;
 /// The surfaces of a scene in their places. Positions are relative to the scene's centre.
 pub(super) struct PlacedScene {
     pub geometry: Geometry,
-    /// Data of each mesh of `geometry` for shading.
+    /// Data of each surface of `geometry` for shading.
     pub meshes: Vec<MeshShading>,
-    /// Emission of each mesh of `geometry`.
+    /// Emission of each surface of `geometry`.
     pub emission: Vec<Option<AreaEmission>>,
     /// Inverse transposes of the instances' maps.
     pub instance_normals: Vec<Mat3A>,
@@ -28,27 +31,14 @@ impl PlacedScene {
         materials: &MaterialSet,
         diagnostics: &mut Diagnostics,
     ) -> PlacedScene {
-        let mut placer = Placer { meshes: std::mem::take(&mut desc.meshes), uses: vec![], parts: vec![] };
-        placer.count_uses(desc);
+        let mut placer = Placer::new(desc, materials);
         let to_origin = DMat4::from_translation(-centre);
-        let mut geometry = Geometry::default();
-        let mut emission = vec![];
-        for shape in &desc.shapes {
-            geometry.world.push(emission.len() as u32);
-            emission.push(shape.emission.clone());
-            placer.place(shape, to_origin * shape.to_world, materials);
-        }
+        let mut geometry = Geometry { world: placer.place_all(&desc.shapes, to_origin, true), ..Geometry::default() };
         for group in &desc.groups {
-            let mut ids = vec![];
-            for shape in &group.shapes {
-                ids.push(emission.len() as u32);
-                emission.push(None);
-                if shape.emission.is_some() {
-                    diagnostics.push(emitter_in_group().at(shape.span.clone()));
-                }
-                placer.place(shape, shape.to_world, materials);
+            for shape in group.shapes.iter().filter(|s| s.emission.is_some()) {
+                diagnostics.push(emitter_in_group().at(shape.span.clone()));
             }
-            geometry.groups.push(ids);
+            geometry.groups.push(placer.place_all(&group.shapes, DMat4::IDENTITY, false));
         }
         let mut instance_normals = vec![];
         for instance in &desc.instances {
@@ -56,10 +46,14 @@ impl PlacedScene {
             geometry.instances.push(Instance { group: instance.group.0, to_world });
             instance_normals.push(normals);
         }
-        let (placed, removed): (Vec<_>, Vec<_>) = placer.finish();
+        let Placer { parts, round, round_shading, mut emission, round_emission, .. } = placer;
+        let (placed, removed): (Vec<_>, Vec<_>) = finish(parts);
         warn_of_flat_triangles(removed, diagnostics);
-        let meshes;
+        let mut meshes: Vec<MeshShading>;
         (geometry.meshes, meshes) = placed.into_iter().unzip();
+        geometry.round = round;
+        meshes.extend(round_shading);
+        emission.extend(round_emission);
         PlacedScene { geometry, meshes, emission, instance_normals }
     }
 }
@@ -84,16 +78,8 @@ fn warn_of_flat_triangles(removed: Vec<(String, usize)>, diagnostics: &mut Diagn
 pub(super) fn centre(desc: &SceneDesc) -> DVec3 {
     let mut bounds: Option<(DVec3, DVec3)> = None;
     let mut grow = |shape: &ShapeDesc, outer: DMat4| {
-        let Some(mesh) = desc.meshes.get(shape.mesh.index()) else { return };
-        if mesh.positions.is_empty() {
-            return;
-        }
         // The corners of the object's box bound the placed object; tightness does not matter for a centre.
-        let (lo, hi) = mesh
-            .positions
-            .par_iter()
-            .fold(|| (Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)))
-            .reduce(|| (Vec3::INFINITY, Vec3::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let Some((lo, hi)) = object_box(desc, shape.geometry) else { return };
         for i in 0..8 {
             let pick = |bit: u32, lo: f32, hi: f32| f64::from(if i >> bit & 1 == 0 { lo } else { hi });
             let corner = DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z));
@@ -115,6 +101,23 @@ pub(super) fn centre(desc: &SceneDesc) -> DVec3 {
     bounds.map_or(DVec3::ZERO, |(lo, hi)| 0.5 * (lo + hi))
 }
 
+/// Box around a shape in its own space; `None` if nothing is there.
+fn object_box(desc: &SceneDesc, geometry: ShapeGeometry) -> Option<(Vec3, Vec3)> {
+    let mesh = match geometry {
+        ShapeGeometry::Mesh(mesh) => desc.meshes.get(mesh.index())?,
+        ShapeGeometry::Round(RoundKind::Sphere) => return Some((Vec3::splat(-1.0), Vec3::ONE)),
+        ShapeGeometry::Round(RoundKind::Disk) => return Some((Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.0))),
+        ShapeGeometry::Round(RoundKind::Cylinder) => return Some((Vec3::new(-1.0, -1.0, 0.0), Vec3::ONE)),
+    };
+    let empty = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    (!mesh.positions.is_empty()).then(|| {
+        mesh.positions
+            .par_iter()
+            .fold(empty, |(lo, hi), p| (lo.min(*p), hi.max(*p)))
+            .reduce(empty, |a, b| (a.0.min(b.0), a.1.max(b.1)))
+    })
+}
+
 fn affine(m: DMat4) -> (Affine3A, Mat3A) {
     let linear = DMat3::from_mat4(m);
     let single =
@@ -132,31 +135,107 @@ struct Part {
     to_place: DMat4,
     flip: bool,
     material: Option<BsdfId>,
-    surface: SurfaceMask,
-    wants_tangents: bool,
-    wants_uvs: bool,
-    wants_colors: bool,
+    wants: Wants,
 }
 
-/// Hands out meshes: the last user of a mesh takes it over, earlier ones copy it.
-struct Placer {
+/// Properties of a surface's material and emission that decide which data it needs.
+struct Wants {
+    surface: SurfaceMask,
+    tangents: bool,
+    uvs: bool,
+    colors: bool,
+}
+
+impl Wants {
+    fn new(shape: &ShapeDesc, materials: &MaterialSet) -> Wants {
+        let wants = materials.get(shape.bsdf).features();
+        let emission_textured = shape.emission.as_ref().is_some_and(|e| matches!(e.radiance, ColorDesc::Texture(_)));
+        Wants {
+            surface: if wants.interface() { SurfaceMask::INTERFACES } else { SurfaceMask::BLOCKERS },
+            tangents: wants.oriented,
+            uvs: wants.textured || wants.oriented || emission_textured,
+            colors: wants.textured,
+        }
+    }
+}
+
+/// Numbers and collects the surfaces of a scene. Hands out meshes: the last user of a mesh takes it over, earlier ones
+/// copy it.
+struct Placer<'a> {
+    materials: &'a MaterialSet,
     meshes: Vec<MeshDesc>,
     uses: Vec<u32>,
     parts: Vec<Part>,
+    /// Emission of each part.
+    emission: Vec<Option<AreaEmission>>,
+    /// Number of the first round shape: they follow on all meshes.
+    first_round: u32,
+    round: Vec<RoundShape>,
+    round_shading: Vec<MeshShading>,
+    round_emission: Vec<Option<AreaEmission>>,
 }
 
-impl Placer {
-    fn count_uses(&mut self, desc: &SceneDesc) {
-        self.uses = vec![0; self.meshes.len()];
+impl<'a> Placer<'a> {
+    fn new(desc: &mut SceneDesc, materials: &'a MaterialSet) -> Placer<'a> {
+        let meshes = std::mem::take(&mut desc.meshes);
+        let mut uses = vec![0; meshes.len()];
+        let mut first_round = 0;
         for shape in desc.shapes.iter().chain(desc.groups.iter().flat_map(|g| &g.shapes)) {
-            if let Some(n) = self.uses.get_mut(shape.mesh.index()) {
-                *n += 1;
+            if let Some(mesh) = shape.geometry.mesh() {
+                first_round += 1;
+                if let Some(n) = uses.get_mut(mesh.index()) {
+                    *n += 1;
+                }
             }
+        }
+        Placer {
+            materials,
+            meshes,
+            uses,
+            first_round,
+            parts: vec![],
+            emission: vec![],
+            round: vec![],
+            round_shading: vec![],
+            round_emission: vec![],
         }
     }
 
-    fn place(&mut self, shape: &ShapeDesc, to_place: DMat4, materials: &MaterialSet) {
-        let i = shape.mesh.index();
+    /// Places shapes that stand together; returns their numbers, meshes first. Their emission counts only if `emits`.
+    fn place_all(&mut self, shapes: &[ShapeDesc], outer: DMat4, emits: bool) -> Vec<u32> {
+        let (mut numbers, mut round) = (vec![], vec![]);
+        for shape in shapes {
+            let emission = if emits { shape.emission.clone() } else { None };
+            match shape.geometry {
+                ShapeGeometry::Mesh(mesh) => {
+                    numbers.push(self.parts.len() as u32);
+                    self.place_mesh(mesh, shape, outer * shape.to_world);
+                    self.emission.push(emission);
+                }
+                ShapeGeometry::Round(kind) => {
+                    round.push(self.first_round + self.round.len() as u32);
+                    self.place_round(kind, shape, outer * shape.to_world);
+                    self.round_emission.push(emission);
+                }
+            }
+        }
+        numbers.append(&mut round);
+        numbers
+    }
+
+    fn place_round(&mut self, kind: RoundKind, shape: &ShapeDesc, to_place: DMat4) {
+        let wants = Wants::new(shape, self.materials);
+        self.round.push(RoundShape::new(kind, to_place, shape.flip_normals, wants.surface));
+        self.round_shading.push(MeshShading {
+            material: shape.bsdf,
+            wants_tangents: wants.tangents,
+            wants_uvs: wants.uvs,
+            ..MeshShading::default()
+        });
+    }
+
+    fn place_mesh(&mut self, mesh: MeshId, shape: &ShapeDesc, to_place: DMat4) {
+        let i = mesh.index();
         let mesh = match self.uses.get_mut(i) {
             Some(1) => std::mem::take(&mut self.meshes[i]),
             Some(n) => {
@@ -165,38 +244,27 @@ impl Placer {
             }
             None => MeshDesc::default(),
         };
-        let material = shape.bsdf;
-        let wants = materials.get(material).features();
-        let emission_textured = shape.emission.as_ref().is_some_and(|e| matches!(e.radiance, ColorDesc::Texture(_)));
-        self.parts.push(Part {
-            mesh,
-            to_place,
-            flip: shape.flip_normals,
-            material,
-            surface: if wants.interface() { SurfaceMask::INTERFACES } else { SurfaceMask::BLOCKERS },
-            wants_tangents: wants.oriented,
-            wants_uvs: wants.textured || wants.oriented || emission_textured,
-            wants_colors: wants.textured,
-        });
+        let wants = Wants::new(shape, self.materials);
+        self.parts.push(Part { mesh, to_place, flip: shape.flip_normals, material: shape.bsdf, wants });
     }
+}
 
-    /// Every mesh in its place, and how many triangles of which mesh had no area.
-    fn finish(self) -> (Vec<PlacedMesh>, Vec<(String, usize)>) {
-        self.parts
-            .into_par_iter()
-            .map(|part| {
-                let name = part.mesh.name.clone();
-                let (placed, removed) = place(part);
-                (placed, (name, removed))
-            })
-            .unzip()
-    }
+/// Every mesh in its place, and how many triangles of which mesh had no area.
+fn finish(parts: Vec<Part>) -> (Vec<PlacedMesh>, Vec<(String, usize)>) {
+    parts
+        .into_par_iter()
+        .map(|part| {
+            let name = part.mesh.name.clone();
+            let (placed, removed) = place(part);
+            (placed, (name, removed))
+        })
+        .unzip()
 }
 
 /// Moves a mesh to its place, drops triangles without area, and turns triangles so that their winding agrees with the
 /// vertex normals (the side of a surface is the side of its geometric normal everywhere after this).
 fn place(part: Part) -> (PlacedMesh, usize) {
-    let Part { mut mesh, to_place, flip, material, surface, wants_tangents, wants_uvs, wants_colors } = part;
+    let Part { mut mesh, to_place, flip, material, wants } = part;
     if to_place != DMat4::IDENTITY {
         mesh.positions.par_iter_mut().for_each(|p| *p = to_place.transform_point3(p.as_dvec3()).as_vec3());
         let normal_map = DMat3::from_mat4(to_place).inverse().transpose();
@@ -240,11 +308,15 @@ fn place(part: Part) -> (PlacedMesh, usize) {
     let removed = before - triangles.len();
     let shading = MeshShading {
         normals: if flat { vec![] } else { mesh.normals },
-        uvs: if wants_uvs { mesh.uvs } else { vec![] },
-        colors: if wants_colors { mesh.colors } else { vec![] },
+        uvs: if wants.uvs { mesh.uvs } else { vec![] },
+        colors: if wants.colors { mesh.colors } else { vec![] },
         material,
         first_light: None,
-        wants_tangents,
+        wants_tangents: wants.tangents,
+        wants_uvs: wants.uvs,
     };
-    ((MeshBuffers { surface, positions: VertexBuffer::new(mesh.positions), triangles }, shading), removed)
+    (
+        (MeshBuffers { surface: wants.surface, positions: VertexBuffer::new(mesh.positions), triangles }, shading),
+        removed,
+    )
 }

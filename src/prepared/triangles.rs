@@ -20,6 +20,9 @@ pub struct Triangle {
 }
 
 impl Triangle {
+    /// Stands where a round shape has no triangle, so that hits on triangles need not ask.
+    const PLACEHOLDER: Triangle = Triangle { corners: [Vec3A::ZERO, Vec3A::X, Vec3A::Y], ng: Vec3A::Z };
+
     fn new(corners: [Vec3; 3]) -> Triangle {
         let ng = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
         Triangle { corners: corners.map(Vec3A::from), ng: ng.into() }
@@ -46,16 +49,16 @@ impl Triangle {
     }
 }
 
-/// Facts about the mesh of a hit, in a form so small that the whole table stays in the cache.
+/// Facts about the surface of a hit, in a form so small that the whole table stays in the cache.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshEntry {
-    /// Number of the mesh's first triangle in the table.
+    /// Number of the mesh's first triangle in the table; of a round shape, that of a placeholder.
     first_triangle: u32,
     /// Number of the light that is its first triangle, or [`MeshEntry::DARK`].
     first_light: u32,
     /// The material; the default one if the file names none.
     pub material: Option<BsdfId>,
-    /// There is nothing to interpolate: see [`MeshShading::is_plain`].
+    /// It is a mesh, and there is nothing to interpolate: see [`MeshShading::is_plain`].
     pub plain: bool,
 }
 
@@ -77,10 +80,12 @@ pub struct TriangleTable {
 }
 
 impl TriangleTable {
-    /// For the meshes of `geometry`, in their order.
+    /// For the surfaces of `geometry`, in their order.
     pub fn new(geometry: &Geometry, shading: &[MeshShading]) -> TriangleTable {
         let mut table = TriangleTable::default();
-        table.triangles.reserve_exact(geometry.meshes.iter().map(|m| m.triangles.len()).sum());
+        let placeholders = usize::from(!geometry.round.is_empty());
+        let count: usize = geometry.meshes.iter().map(|m| m.triangles.len()).sum();
+        table.triangles.reserve_exact(count + placeholders);
         for (buffers, shading) in geometry.meshes.iter().zip(shading) {
             table.meshes.push(MeshEntry {
                 first_triangle: table.triangles.len() as u32,
@@ -90,6 +95,18 @@ impl TriangleTable {
             });
             table.triangles.extend((0..buffers.triangles.len()).map(|i| Triangle::new(buffers.corners(i as u32))));
         }
+        let placeholder = table.triangles.len() as u32;
+        for shading in shading.iter().skip(geometry.meshes.len()) {
+            table.meshes.push(MeshEntry {
+                first_triangle: placeholder,
+                first_light: shading.first_light.unwrap_or(MeshEntry::DARK),
+                material: shading.material,
+                plain: false,
+            });
+        }
+        if !geometry.round.is_empty() {
+            table.triangles.push(Triangle::PLACEHOLDER);
+        }
         table
     }
 
@@ -98,7 +115,7 @@ impl TriangleTable {
         std::mem::size_of_val(&self.meshes[..]) + std::mem::size_of_val(&self.triangles[..])
     }
 
-    /// Facts about the mesh that was hit.
+    /// Facts about the surface that was hit.
     #[inline]
     pub fn mesh(&self, hit: &Hit) -> &MeshEntry {
         &self.meshes[hit.mesh as usize]

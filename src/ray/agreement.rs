@@ -97,8 +97,9 @@ pub fn compare(a: &dyn RayQuery, b: &dyn RayQuery, bounds: (Vec3, Vec3), count: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::{Backend, Geometry, Instance, MeshBuffers, VertexBuffer};
-    use glam::{Affine3A, Mat3A, Vec3A};
+    use crate::ray::{Backend, Geometry, Instance, MeshBuffers, RoundShape, VertexBuffer};
+    use crate::scene::RoundKind;
+    use glam::{Affine3A, DMat4, DVec3, Mat3A, Vec3A};
     use std::sync::Arc;
 
     /// Triangles of all shapes in a cube of side `scale` around `centre`.
@@ -151,6 +152,7 @@ mod tests {
             world: vec![0, 1],
             groups: vec![vec![2, 3]],
             instances: vec![Instance { group: 0, to_world: Affine3A::from_translation(Vec3::X) }],
+            ..Geometry::default()
         };
         check(geometry, 2e-3);
     }
@@ -186,7 +188,37 @@ mod tests {
             Instance { group: 0, to_world: sheared },
             Instance { group: 1, to_world: mirrored },
         ];
-        check(Geometry { meshes, world: vec![0], groups: vec![vec![1, 2], vec![2]], instances }, 1e-3);
+        let groups = vec![vec![1, 2], vec![2]];
+        check(Geometry { meshes, world: vec![0], groups, instances, ..Geometry::default() }, 1e-3);
+    }
+
+    /// Round shapes of every kind among triangles, in the world and in stretched instances; some are interfaces.
+    #[test]
+    fn round_shapes_agree() {
+        let mut rng = HashRng::new(17, 1, 0, 0);
+        let mut shape = |i: usize| {
+            let [x, y, z, w] = rng.next_4().map(f64::from);
+            let kind = [RoundKind::Sphere, RoundKind::Disk, RoundKind::Cylinder][i % 3];
+            let to_place = DMat4::from_translation(DVec3::new(x, y, z) - 0.5)
+                * DMat4::from_euler(glam::EulerRot::XYZ, 6.0 * x, 6.0 * y, 6.0 * z)
+                * DMat4::from_scale(DVec3::new(0.05 + 0.2 * w, 0.05 + 0.2 * x, 0.1));
+            let surface = if i.is_multiple_of(4) { SurfaceMask::INTERFACES } else { SurfaceMask::BLOCKERS };
+            RoundShape::new(kind, to_place, false, surface)
+        };
+        let round: Vec<RoundShape> = (0..60).map(&mut shape).collect();
+        let stretched = Affine3A {
+            matrix3: Mat3A::from_cols(
+                Vec3A::new(0.5, 0.3, 0.0),
+                Vec3A::new(-0.5, 1.0, 0.2),
+                Vec3A::new(0.0, 0.1, -0.8),
+            ),
+            translation: Vec3A::new(1.0, 0.2, 0.1),
+        };
+        let instances = vec![Instance { group: 1, to_world: stretched }, Instance { group: 0, to_world: stretched }];
+        let meshes = vec![soup(30, 1.0, Vec3::ZERO, 18), soup(20, 1.0, Vec3::Y, 19)];
+        let world = [0].into_iter().chain(2..42).collect();
+        let groups = vec![vec![], [1].into_iter().chain(42..62).collect()];
+        check(Geometry { meshes, round, world, groups, instances }, 1e-3);
     }
 
     #[test]

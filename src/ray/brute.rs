@@ -1,8 +1,8 @@
-//! The oracle: every triangle against every ray, in double precision. Slow on purpose; nothing here is approximate but
+//! The oracle: every surface against every ray, in double precision. Slow on purpose; nothing here is approximate but
 //! f64 itself.
 
 use super::geometry::Geometry;
-use super::{Hit, Ray, RayQuery, SurfaceMask};
+use super::{Hit, Ray, RayQuery, RoundShape, SurfaceMask};
 use glam::DVec3;
 
 struct Triangle {
@@ -13,16 +13,24 @@ struct Triangle {
     surface: SurfaceMask,
 }
 
-/// All triangles in world space.
+/// A round shape in world space.
+struct Round {
+    shape: RoundShape,
+    surface: u32,
+    instance: u32,
+}
+
+/// All surfaces in world space.
 pub struct BruteScene {
     triangles: Vec<Triangle>,
+    round: Vec<Round>,
 }
 
 impl BruteScene {
-    /// Copies every triangle, instances placed.
+    /// Copies every surface, instances placed.
     pub fn build(geometry: &Geometry) -> BruteScene {
         let mut triangles = Vec::with_capacity(geometry.triangle_count());
-        geometry.for_each_placed(|mesh, instance, to_world| {
+        geometry.for_each_placed_mesh(|mesh, instance, to_world| {
             let buffers = &geometry.meshes[mesh as usize];
             for triangle in 0..buffers.triangles.len() as u32 {
                 let corners = buffers.corners(triangle).map(|p| match to_world {
@@ -40,7 +48,9 @@ impl BruteScene {
                 triangles.push(Triangle { corners, triangle, mesh, instance, surface: buffers.surface });
             }
         });
-        BruteScene { triangles }
+        let mut round = vec![];
+        geometry.for_each_placed_round(|surface, instance, shape| round.push(Round { shape, surface, instance }));
+        BruteScene { triangles, round }
     }
 }
 
@@ -85,6 +95,14 @@ impl RayQuery for BruteScene {
                 });
             }
         }
+        for Round { shape, surface, instance } in &self.round {
+            if let Some((t, [u, v])) = shape.intersect(ray.o, ray.d, [ray.t_min, ray.t_max])
+                && t < nearest
+            {
+                nearest = t;
+                best = Some(Hit { t: t as f32, u, v, triangle: 0, mesh: *surface, instance: *instance });
+            }
+        }
         best
     }
 
@@ -92,6 +110,10 @@ impl RayQuery for BruteScene {
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
         let inside = f64::from(ray.t_min)..f64::from(ray.t_max);
         let met = |tri: &Triangle| intersect(&tri.corners, o, d).is_some_and(|(t, ..)| inside.contains(&t));
+        let interval = [ray.t_min, ray.t_max];
         self.triangles.iter().any(|tri| tri.surface.intersects(blockers) && met(tri))
+            || self.round.iter().any(|Round { shape, .. }| {
+                shape.surface.intersects(blockers) && shape.intersect(ray.o, ray.d, interval).is_some()
+            })
     }
 }

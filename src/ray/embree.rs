@@ -4,10 +4,14 @@
 //! that is in the module `version` below. Scenes are built with the ROBUST flag (no leaks at shared edges, and packets
 //! of any width give the answers of single rays) at medium quality; packets are never flagged coherent, which is
 //! slower.
+//!
+//! Round shapes are user geometry: Embree finds the boxes that a ray meets and calls back for the shapes in them, which
+//! are met in double precision (Embree's own spheres are met in single precision). All round shapes of the world, or of a
+//! group, are one geometry; hits on them report the shape's number as their geometry's, so that a hit is read in one way.
 #![allow(unsafe_code)]
 
 use super::geometry::Geometry;
-use super::{Hit, NONE, PACKET, QueryError, Ray, RayQuery, SegmentPacket, SurfaceMask, T_MIN};
+use super::{Hit, NONE, PACKET, QueryError, Ray, RayQuery, RoundShape, SegmentPacket, SurfaceMask, T_MIN, lanes};
 use glam::Vec4;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::sync::{Arc, Mutex};
@@ -61,6 +65,9 @@ mod version {
         // SAFETY: the caller's promise; `Valid` and `RTCRay16` have the alignment of 64 bytes that the call wants.
         unsafe { rtcOccluded16(valid.0.as_ptr(), scene, &mut context(), rays) }
     }
+
+    /// Tells whether a callback found a hit in a lane, by whose flag Embree does not look: the end of the ray says it.
+    pub fn report(_valid: &mut i32, _met: bool) {}
 }
 
 /// Differences between the versions.
@@ -88,6 +95,11 @@ mod version {
     pub unsafe fn occluded16(scene: RTCScene, valid: &super::Valid, rays: &mut RTCRay16) {
         // SAFETY: the caller's promise; `Valid` and `RTCRay16` have the alignment of 64 bytes that the call wants.
         unsafe { rtcOccluded16(valid.0.as_ptr(), scene, rays, null_mut()) }
+    }
+
+    /// Tells whether a callback found a hit in a lane, by its flag.
+    pub fn report(valid: &mut i32, met: bool) {
+        *valid = -i32::from(met);
     }
 }
 
@@ -182,11 +194,76 @@ impl Drop for SceneHandle {
     }
 }
 
-/// A scene of shared vertex and index buffers. Fields are dropped in order: scenes, then the device, then the buffers.
+/// The round shapes of the world or of a group, as callbacks find them.
+struct RoundPool {
+    geometry: Arc<Geometry>,
+    /// Index of the first one in [`Geometry::round`].
+    first: usize,
+    /// The geometry that hits on the first one report; those on others report the numbers that follow.
+    number: u32,
+}
+
+/// The pool's shape number `primitive`.
+///
+/// # Safety
+/// `user` is the address of a live [`RoundPool`] which has the shape.
+unsafe fn pool_shape<'a>(user: *mut c_void, primitive: u32) -> (&'a RoundPool, &'a RoundShape) {
+    // SAFETY: the caller's promise.
+    let pool = unsafe { &*user.cast::<RoundPool>() };
+    (pool, &pool.geometry.round[pool.first + primitive as usize])
+}
+
+/// Embree asks for the box of a shape; it must not unwind.
+unsafe extern "C" fn round_bounds(args: *const RTCBoundsFunctionArguments) {
+    // SAFETY: Embree passes arguments that live during the call, with the pool given to the geometry.
+    unsafe {
+        let args = &*args;
+        let (lo, hi) = pool_shape(args.geometryUserPtr, args.primID).1.bounds();
+        let out = &mut *args.bounds_o;
+        (out.lower_x, out.lower_y, out.lower_z) = (lo.x, lo.y, lo.z);
+        (out.upper_x, out.upper_y, out.upper_z) = (hi.x, hi.y, hi.z);
+    }
+}
+
+/// Embree found rays in the box of a shape; it must not unwind.
+unsafe extern "C" fn round_intersect(args: *const RTCIntersectFunctionNArguments) {
+    // SAFETY: Embree passes arguments that live during the call: `N` rays with hits in rows of `N` floats that nobody
+    // else refers to, as many flags of lanes in use, the query's context, and the pool given to the geometry.
+    unsafe {
+        let args = &*args;
+        let (pool, shape) = pool_shape(args.geometryUserPtr, args.primID);
+        let n = args.N as usize;
+        let rows = std::slice::from_raw_parts_mut(args.rayhit.cast::<f32>(), lanes::RAY_HIT_ROWS * n);
+        let valid = std::slice::from_raw_parts_mut(args.valid, n);
+        let ids = [pool.number + args.primID, (*args.context).instID[0]];
+        for (lane, valid) in valid.iter_mut().enumerate().filter(|(_, valid)| **valid != 0) {
+            version::report(valid, lanes::intersect(rows, [n, lane], shape, ids));
+        }
+    }
+}
+
+/// Embree found segments in the box of a shape; it must not unwind.
+unsafe extern "C" fn round_occluded(args: *const RTCOccludedFunctionNArguments) {
+    // SAFETY: as in `round_intersect`, without hits.
+    unsafe {
+        let args = &*args;
+        let (_, shape) = pool_shape(args.geometryUserPtr, args.primID);
+        let n = args.N as usize;
+        let rows = std::slice::from_raw_parts_mut(args.ray.cast::<f32>(), lanes::RAY_ROWS * n);
+        let valid = std::slice::from_raw_parts_mut(args.valid, n);
+        for (lane, valid) in valid.iter_mut().enumerate().filter(|(_, valid)| **valid != 0) {
+            version::report(valid, lanes::occlude(rows, [n, lane], shape));
+        }
+    }
+}
+
+/// A scene of shared buffers. Fields are dropped in order: scenes, then the device, then what they read.
 pub struct EmbreeScene {
     top: SceneHandle,
     _groups: Vec<SceneHandle>,
     device: Device,
+    /// Embree keeps their addresses.
+    _pools: Vec<Arc<RoundPool>>,
     geometry: Arc<Geometry>,
 }
 
@@ -203,30 +280,79 @@ impl EmbreeScene {
     /// If Embree reports one.
     pub fn build(geometry: Arc<Geometry>, threads: usize) -> Result<EmbreeScene, QueryError> {
         let device = Device::new(threads)?;
+        let mut pools = vec![];
         let mut groups = Vec::with_capacity(geometry.groups.len());
-        for meshes in &geometry.groups {
+        for surfaces in &geometry.groups {
             let scene = new_scene(&device);
-            for (id, &mesh) in meshes.iter().enumerate() {
-                attach_mesh(&device, &scene, &geometry, mesh, id as u32);
-            }
+            // Geometries are numbered by their place in the group.
+            let number = geometry.meshes_of(surfaces).len() as u32;
+            attach_surfaces(&device, &scene, &geometry, surfaces, number, &mut pools)?;
             commit(&scene);
             device.check()?;
             groups.push(scene);
         }
         let top = new_scene(&device);
-        for (id, &mesh) in geometry.world.iter().enumerate() {
-            if mesh as usize != id {
-                return Err(QueryError("the meshes of the world are not the first ones".into()));
-            }
-            attach_mesh(&device, &top, &geometry, mesh, id as u32);
+        if geometry.meshes_of(&geometry.world).iter().enumerate().any(|(id, &mesh)| mesh as usize != id) {
+            return Err(QueryError("the meshes of the world are not the first ones".into()));
         }
+        attach_surfaces(&device, &top, &geometry, &geometry.world, geometry.meshes.len() as u32, &mut pools)?;
         for (i, instance) in geometry.instances.iter().enumerate() {
-            let id = (geometry.world.len() + i) as u32;
+            let id = first_instance(&geometry) + i as u32;
             attach_instance(&device, &top, &groups[instance.group as usize], instance, id);
         }
         commit(&top);
         device.check()?;
-        Ok(EmbreeScene { top, _groups: groups, device, geometry })
+        Ok(EmbreeScene { top, _groups: groups, device, _pools: pools, geometry })
+    }
+}
+
+/// Number of the first instance among the geometries of the world: behind its meshes and the pool of its round shapes.
+fn first_instance(geometry: &Geometry) -> u32 {
+    geometry.meshes_of(&geometry.world).len() as u32 + 1
+}
+
+/// Attaches the meshes among `surfaces`, numbered from 0, and then the pool of the round ones; hits on the first of
+/// these report the geometry `number`.
+fn attach_surfaces(
+    device: &Device,
+    scene: &SceneHandle,
+    geometry: &Arc<Geometry>,
+    surfaces: &[u32],
+    number: u32,
+    pools: &mut Vec<Arc<RoundPool>>,
+) -> Result<(), QueryError> {
+    let (meshes, round) = surfaces.split_at(geometry.meshes_of(surfaces).len());
+    for (id, &mesh) in meshes.iter().enumerate() {
+        attach_mesh(device, scene, geometry, mesh, id as u32);
+    }
+    let Some(&first) = round.first() else { return Ok(()) };
+    let in_a_row = round.iter().zip(first..).all(|(&surface, expected)| surface == expected);
+    let first = first as usize - geometry.meshes.len();
+    if !in_a_row || first + round.len() > geometry.round.len() {
+        return Err(QueryError("round shapes that stand together are not in a row".into()));
+    }
+    let pool = Arc::new(RoundPool { geometry: geometry.clone(), first, number });
+    attach_pool(device, scene, &pool, round.len() as u32, meshes.len() as u32);
+    pools.push(pool);
+    Ok(())
+}
+
+/// Attaches `count` round shapes as the geometry `id`.
+fn attach_pool(device: &Device, scene: &SceneHandle, pool: &RoundPool, count: u32, id: u32) {
+    let user = std::ptr::from_ref::<RoundPool>(pool).cast_mut().cast::<c_void>();
+    // SAFETY: device and scene are alive. The pool does not move and is owned by the finished `EmbreeScene`, which frees
+    // it after scenes and device; callbacks only read it. Masks are looked at by the callbacks, shape by shape.
+    unsafe {
+        let handle = rtcNewGeometry(device.raw, RTCGeometryType::RTC_GEOMETRY_TYPE_USER);
+        rtcSetGeometryUserPrimitiveCount(handle, count);
+        rtcSetGeometryUserData(handle, user);
+        rtcSetGeometryBoundsFunction(handle, Some(round_bounds), std::ptr::null_mut());
+        rtcSetGeometryIntersectFunction(handle, Some(round_intersect));
+        rtcSetGeometryOccludedFunction(handle, Some(round_occluded));
+        rtcSetGeometryMask(handle, u32::MAX);
+        rtcCommitGeometry(handle);
+        rtcAttachGeometryByID(scene.0, handle, id);
+        rtcReleaseGeometry(handle);
     }
 }
 
@@ -354,16 +480,16 @@ impl EmbreeScene {
         if hit.geomID == u32::MAX {
             return None;
         }
-        // A mesh of the world has the number of its geometry (checked when the scene was built).
+        // A surface of the world has the number of its geometry (checked when the scene was built).
         let (mesh, instance) =
             if hit.instID[0] == u32::MAX { (hit.geomID, NONE) } else { self.in_instance(hit.geomID, hit.instID[0]) };
         Some(Hit { t: rows.ray.t_far, u: hit.u, v: hit.v, triangle: hit.primID, mesh, instance })
     }
 
-    /// Mesh and instance of a hit on an instance.
+    /// Surface and instance of a hit on an instance.
     #[cold]
     fn in_instance(&self, geometry: u32, instance: u32) -> (u32, u32) {
-        let instance = instance - self.geometry.world.len() as u32;
+        let instance = instance - first_instance(&self.geometry);
         let group = self.geometry.instances[instance as usize].group;
         (self.geometry.groups[group as usize][geometry as usize], instance)
     }
@@ -450,43 +576,4 @@ impl RayQuery for EmbreeScene {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::Vec3;
-    use crate::ray::{MeshBuffers, Segment, VertexBuffer};
-
-    fn one_triangle() -> Arc<Geometry> {
-        let mesh = MeshBuffers {
-            positions: VertexBuffer::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y]),
-            triangles: vec![[0, 1, 2]],
-            surface: SurfaceMask::BLOCKERS,
-        };
-        Arc::new(Geometry { meshes: vec![mesh], world: vec![0], ..Geometry::default() })
-    }
-
-    #[test]
-    fn an_error_surfaces_as_an_error() {
-        let device = Device::new(1).unwrap();
-        assert!(device.check().is_ok());
-        // SAFETY: Embree reports a null geometry as an invalid argument and does nothing.
-        unsafe { rtcCommitGeometry(std::ptr::null_mut()) };
-        // The report has no device to go to, so the slot stays empty; a null instanced scene of a live device has one.
-        let scene = new_scene(&device);
-        // SAFETY: the scene is alive; the null geometry is reported, not followed.
-        unsafe { rtcAttachGeometryByID(scene.0, std::ptr::null_mut(), 0) };
-        assert!(device.check().is_err());
-        assert!(device.check().is_ok(), "an error is reported once");
-    }
-
-    #[test]
-    fn invalid_rays_are_filtered_in_packets() {
-        let scene = EmbreeScene::build(one_triangle(), 1).unwrap();
-        let mut packet = SegmentPacket::default();
-        let from = Vec3::new(0.25, 0.25, 1.0);
-        packet.push(&Segment::between(from, Vec3::new(0.25, 0.25, -1.0)));
-        packet.push(&Segment::between(Vec3::new(f32::NAN, 0.0, 0.0), from));
-        packet.push(&Segment::between(from, Vec3::new(f32::INFINITY, 0.0, 0.0)));
-        packet.push(&Segment::between(from, Vec3::new(2.0, 2.0, 2.0)));
-        assert_eq!(scene.occluded_packet(&packet), (0b0111, 2));
-    }
-}
+mod tests;

@@ -1,5 +1,8 @@
-//! Triangles as the backends and the shading code share them: one copy, never moved while a scene lives.
+//! Surfaces as the backends and the shading code share them: one copy, never moved while a scene lives.
+//!
+//! A surface is a mesh or a round shape. Both are numbered together, the meshes first.
 
+use super::RoundShape;
 use crate::math::Vec3;
 use glam::Affine3A;
 use std::ops::Deref;
@@ -83,11 +86,13 @@ pub struct Instance {
 /// Everything a ray can meet.
 #[derive(Debug, Default)]
 pub struct Geometry {
-    /// All meshes; those of the world come first, in the order of `world`.
+    /// All meshes; those of the world come first.
     pub meshes: Vec<MeshBuffers>,
-    /// Meshes that stand in the world itself.
+    /// All round shapes; those of the world come first, and those of a group in a row.
+    pub round: Vec<RoundShape>,
+    /// Numbers of the surfaces that stand in the world itself: its meshes in a row from 0, then its round shapes.
     pub world: Vec<u32>,
-    /// Sets of meshes that only instances show, in group space.
+    /// Sets of surfaces that only instances show, in group space: first meshes, then round shapes in a row.
     pub groups: Vec<Vec<u32>>,
     /// Placed groups.
     pub instances: Vec<Instance>,
@@ -96,47 +101,85 @@ pub struct Geometry {
 impl Geometry {
     /// Triangles that a ray can meet, instances counted each time.
     pub fn triangle_count(&self) -> usize {
-        let count = |meshes: &[u32]| meshes.iter().map(|&m| self.meshes[m as usize].triangles.len()).sum::<usize>();
-        count(&self.world) + self.instances.iter().map(|i| count(&self.groups[i.group as usize])).sum::<usize>()
+        let of = |&m: &u32| self.meshes.get(m as usize).map_or(0, |mesh| mesh.triangles.len());
+        self.count(|surfaces| surfaces.iter().map(of).sum())
     }
 
-    /// Bytes of vertices and indices.
+    /// Round shapes that a ray can meet, instances counted each time.
+    pub fn round_count(&self) -> usize {
+        self.count(|surfaces| surfaces.len() - self.meshes_of(surfaces).len())
+    }
+
+    /// Sum of a number over the world and the group of every instance.
+    fn count(&self, of: impl Fn(&[u32]) -> usize) -> usize {
+        of(&self.world) + self.instances.iter().map(|i| of(&self.groups[i.group as usize])).sum::<usize>()
+    }
+
+    /// The surface `surface` if it is a round shape.
+    #[inline]
+    pub fn round_shape(&self, surface: u32) -> Option<&RoundShape> {
+        self.round.get((surface as usize).wrapping_sub(self.meshes.len()))
+    }
+
+    /// The meshes among the surfaces of the world or of a group.
+    pub fn meshes_of<'a>(&self, surfaces: &'a [u32]) -> &'a [u32] {
+        &surfaces[..surfaces.partition_point(|&s| (s as usize) < self.meshes.len())]
+    }
+
+    /// Bytes of vertices, indices and round shapes.
     pub fn bytes(&self) -> usize {
-        self.meshes.iter().map(|m| m.positions.len() * 12 + m.triangles.len() * 12).sum()
+        let meshes: usize = self.meshes.iter().map(|m| m.positions.len() * 12 + m.triangles.len() * 12).sum();
+        meshes + std::mem::size_of_val(&self.round[..])
     }
 
     /// Calls `f(mesh, instance, to_world)` for every mesh that stands somewhere.
-    pub fn for_each_placed(&self, mut f: impl FnMut(u32, u32, Option<&Affine3A>)) {
-        for &mesh in &self.world {
-            f(mesh, super::NONE, None);
+    pub fn for_each_placed_mesh(&self, mut f: impl FnMut(u32, u32, Option<&Affine3A>)) {
+        self.for_each_placed(|surface, instance, to_world| {
+            if (surface as usize) < self.meshes.len() {
+                f(surface, instance, to_world);
+            }
+        });
+    }
+
+    /// Calls `f(surface, instance, shape)` for every round shape that stands somewhere, in the world.
+    pub fn for_each_placed_round(&self, mut f: impl FnMut(u32, u32, RoundShape)) {
+        self.for_each_placed(|surface, instance, to_world| {
+            if let Some(shape) = self.round_shape(surface) {
+                f(surface, instance, to_world.map_or_else(|| shape.clone(), |m| shape.placed(m)));
+            }
+        });
+    }
+
+    fn for_each_placed(&self, mut f: impl FnMut(u32, u32, Option<&Affine3A>)) {
+        for &surface in &self.world {
+            f(surface, super::NONE, None);
         }
         for (i, instance) in self.instances.iter().enumerate() {
-            for &mesh in &self.groups[instance.group as usize] {
-                f(mesh, i as u32, Some(&instance.to_world));
+            for &surface in &self.groups[instance.group as usize] {
+                f(surface, i as u32, Some(&instance.to_world));
             }
         }
     }
 
-    /// Smallest box around the mesh `mesh` in its own space; `None` if it has no vertices.
-    pub fn mesh_bounds(&self, mesh: u32) -> Option<(Vec3, Vec3)> {
-        union(self.meshes[mesh as usize].positions.iter().map(|&p| (p, p)))
-    }
-
-    /// Smallest box around the meshes `meshes` in their own space; `None` if they have no vertices.
-    pub fn bounds_of(&self, meshes: &[u32]) -> Option<(Vec3, Vec3)> {
-        union(meshes.iter().filter_map(|&mesh| self.mesh_bounds(mesh)))
+    /// Smallest box around the surfaces `surfaces` in their own space; `None` if nothing is there.
+    pub fn bounds_of(&self, surfaces: &[u32]) -> Option<(Vec3, Vec3)> {
+        union(surfaces.iter().filter_map(|&surface| match self.round_shape(surface) {
+            Some(shape) => Some(shape.bounds()),
+            None => union(self.meshes[surface as usize].positions.iter().map(|&p| (p, p))),
+        }))
     }
 
     /// Smallest box around everything; `None` if there is nothing.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let mut bounds: Option<(Vec3, Vec3)> = None;
-        self.for_each_placed(|mesh, _, to_world| {
+        self.for_each_placed_mesh(|mesh, _, to_world| {
             for &p in self.meshes[mesh as usize].positions.iter() {
                 let p = to_world.map_or(p, |m| m.transform_point3(p));
                 let (lo, hi) = bounds.unwrap_or((p, p));
                 bounds = Some((lo.min(p), hi.max(p)));
             }
         });
+        self.for_each_placed_round(|_, _, shape| bounds = union(bounds.into_iter().chain([shape.bounds()])));
         bounds
     }
 }

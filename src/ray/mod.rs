@@ -1,7 +1,7 @@
 //! Ray queries behind one trait: closest hit, occlusion of a segment, and occlusion in packets.
 //!
 //! Three backends answer the same questions: [`embree`] (Debian's Embree, the default and the only `unsafe` file),
-//! [`obvhs`] (pure Rust, for machines without Embree) and [`brute`] (every triangle in double precision, the tests'
+//! [`obvhs`] (pure Rust, for machines without Embree) and [`brute`] (every surface in double precision, the tests'
 //! oracle). Integrators see none of them: they hold a [`Tracer`], which counts rays by kind and knows how long they
 //! took.
 //!
@@ -14,13 +14,17 @@ pub mod brute;
 #[cfg(any(embree3, embree4))]
 pub mod embree;
 pub mod geometry;
+#[cfg(any(embree3, embree4))]
+mod lanes;
 pub mod obvhs;
 pub mod offset;
 pub mod phases;
+pub mod round;
 pub mod tracer;
 
 pub use geometry::{Geometry, Instance, MeshBuffers, SurfaceMask, VertexBuffer};
 pub use phases::Phases;
+pub use round::{RoundPoint, RoundShape};
 pub use tracer::{RayKind, RayStats, Tracer, Work};
 
 use crate::math::Vec3;
@@ -69,13 +73,13 @@ impl Ray {
 pub struct Hit {
     /// Ray parameter.
     pub t: f32,
-    /// Barycentric coordinate of the triangle's second vertex.
+    /// Barycentric coordinate of the triangle's second vertex; of a round shape, the first number of the point's code.
     pub u: f32,
-    /// Barycentric coordinate of the triangle's third vertex.
+    /// Barycentric coordinate of the triangle's third vertex; of a round shape, the second number of the point's code.
     pub v: f32,
-    /// Triangle of the mesh.
+    /// Triangle of the mesh; 0 on a round shape.
     pub triangle: u32,
-    /// Mesh of the [`Geometry`].
+    /// Surface of the [`Geometry`].
     pub mesh: u32,
     /// Instance of the [`Geometry`], or [`NONE`].
     pub instance: u32,
@@ -200,7 +204,7 @@ pub enum Backend {
     Embree,
     /// Pure Rust.
     Obvhs,
-    /// Every triangle, in double precision.
+    /// Every surface, in double precision.
     Brute,
 }
 

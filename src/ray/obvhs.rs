@@ -5,10 +5,10 @@
 //! power of two (exact in floating point) to a diagonal near 2¹², and directions are normalised. Leaf boxes are
 //! inflated by 2⁻²¹ of their largest coordinate, and the triangle test uses edge functions that are shared by
 //! neighbours (Plücker, Davidovič et al. 2012), so that a ray through a shared edge never slips between two triangles.
-//! Instances are flattened.
+//! Instances are flattened. Round shapes have a tree of their own, so that triangles pay nothing for them.
 
 use super::geometry::Geometry;
-use super::{Hit, QueryError, Ray, RayQuery, SurfaceMask};
+use super::{Hit, QueryError, Ray, RayQuery, RoundShape, SurfaceMask};
 use crate::math::Vec3;
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -40,9 +40,88 @@ struct Identity {
     surface: SurfaceMask,
 }
 
+/// Box of a round shape in the private space.
+struct ShapeBox {
+    lo: Vec3A,
+    hi: Vec3A,
+}
+
+impl Boundable for ShapeBox {
+    fn aabb(&self) -> Aabb {
+        let margin = self.lo.abs().max(self.hi.abs()).max_element() * (-21f32).exp2();
+        Aabb { min: self.lo - margin, max: self.hi + margin }
+    }
+}
+
+/// A round shape in the world.
+#[derive(Clone)]
+struct Round {
+    shape: RoundShape,
+    surface: u32,
+    instance: u32,
+}
+
+/// The tree over the round shapes, which are in its leaf order.
+struct RoundTree {
+    tree: CwBvh,
+    round: Vec<Round>,
+}
+
+impl RoundTree {
+    /// `None` if there are no round shapes; `enter` moves a point into the private space.
+    fn build(geometry: &Geometry, enter: impl Fn(Vec3) -> Vec3A) -> Option<RoundTree> {
+        let mut round = vec![];
+        geometry.for_each_placed_round(|surface, instance, shape| round.push(Round { shape, surface, instance }));
+        if round.is_empty() {
+            return None;
+        }
+        let box_of = |r: &Round| {
+            let (lo, hi) = r.shape.bounds();
+            ShapeBox { lo: enter(lo), hi: enter(hi) }
+        };
+        let boxes: Vec<ShapeBox> = round.iter().map(box_of).collect();
+        let mut time = std::time::Duration::ZERO;
+        let mut tree = build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut time);
+        let order = std::mem::take(&mut tree.primitive_indices);
+        Some(RoundTree { tree, round: order.iter().map(|&i| round[i as usize].clone()).collect() })
+    }
+
+    /// The first round shape in the ray's interval; `inner` is the ray in the private space, `length` as from
+    /// [`ObvhsScene::enter`].
+    fn closest(&self, ray: &Ray, inner: TreeRay, length: f32) -> Option<Hit> {
+        let (mut best, mut nearest) = (None, f64::INFINITY);
+        let mut hit = RayHit::none();
+        self.tree.ray_traverse(inner, &mut hit, |_, id| {
+            let Round { shape, surface, instance } = &self.round[id];
+            match shape.intersect(ray.o, ray.d, [ray.t_min, ray.t_max]) {
+                Some((t, [u, v])) => {
+                    if t < nearest {
+                        nearest = t;
+                        best = Some(Hit { t: t as f32, u, v, triangle: 0, mesh: *surface, instance: *instance });
+                    }
+                    t as f32 * length
+                }
+                None => f32::INFINITY,
+            }
+        });
+        best
+    }
+
+    fn occluded(&self, ray: &Ray, inner: TreeRay, blockers: SurfaceMask) -> bool {
+        !self.tree.ray_traverse_miss(inner, |inner, id| {
+            let shape = &self.round[id].shape;
+            let met =
+                shape.surface.intersects(blockers) && shape.intersect(ray.o, ray.d, [ray.t_min, ray.t_max]).is_some();
+            // The interval is that of the ray itself: whatever is met is before the end of the private one.
+            if met { inner.tmin } else { f32::INFINITY }
+        })
+    }
+}
+
 /// A flattened scene.
 pub struct ObvhsScene {
     tree: Option<CwBvh>,
+    round: Option<RoundTree>,
     /// In the tree's leaf order.
     corners: Vec<Corners>,
     identities: Vec<Identity>,
@@ -56,9 +135,9 @@ impl ObvhsScene {
     /// # Errors
     /// If there are more triangles than the tree can number.
     pub fn build(geometry: &Geometry) -> Result<ObvhsScene, QueryError> {
-        let count = geometry.triangle_count();
+        let count = geometry.triangle_count() + geometry.round_count();
         if u32::try_from(count).is_err() {
-            return Err(QueryError(format!("{count} triangles are more than the obvhs backend can hold")));
+            return Err(QueryError(format!("{count} surfaces are more than the obvhs backend can hold")));
         }
         let (lo, hi) = geometry.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
         let centre = 0.5 * (lo + hi);
@@ -67,7 +146,8 @@ impl ObvhsScene {
         let scale = (log2.clamp(-100, 100) as f32).exp2();
 
         let (mut corners, mut identities) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        geometry.for_each_placed(|mesh, instance, to_world| {
+        let round = RoundTree::build(geometry, |p| Vec3A::from((p - centre) * scale));
+        geometry.for_each_placed_mesh(|mesh, instance, to_world| {
             let buffers = &geometry.meshes[mesh as usize];
             for triangle in 0..buffers.triangles.len() as u32 {
                 let placed = buffers.corners(triangle).map(|p| to_world.map_or(p, |m| m.transform_point3(p)));
@@ -76,7 +156,7 @@ impl ObvhsScene {
             }
         });
         if corners.is_empty() {
-            return Ok(ObvhsScene { tree: None, corners, identities, centre, scale });
+            return Ok(ObvhsScene { tree: None, round, corners, identities, centre, scale });
         }
         let mut time = std::time::Duration::ZERO;
         let mut tree = build_cwbvh(&corners, BvhBuildParams::medium_build(), &mut time);
@@ -84,7 +164,7 @@ impl ObvhsScene {
         let order = std::mem::take(&mut tree.primitive_indices);
         let ordered = order.iter().map(|&i| Corners(corners[i as usize].0)).collect();
         let identities = order.iter().map(|&i| identities[i as usize]).collect();
-        Ok(ObvhsScene { tree: Some(tree), corners: ordered, identities, centre, scale })
+        Ok(ObvhsScene { tree: Some(tree), round, corners: ordered, identities, centre, scale })
     }
 
     /// The ray in the private space with a unit direction, and the length of `d` there: private t = t · length.
@@ -134,7 +214,25 @@ impl RayQuery for ObvhsScene {
     }
 
     fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let (tree, (inner, length)) = (self.tree.as_ref()?, self.enter(ray)?);
+        let (inner, length) = self.enter(ray)?;
+        let Some(round) = &self.round else { return self.closest_triangle(inner, length) };
+        let triangle = self.closest_triangle(inner, length);
+        let nearest = Ray { t_max: triangle.map_or(ray.t_max, |hit| hit.t), ..*ray };
+        round.closest(&nearest, self.enter(&nearest)?.0, length).or(triangle)
+    }
+
+    fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
+        let Some((inner, _)) = self.enter(ray) else { return false };
+        self.occluded_by_triangle(inner, blockers)
+            || self.round.as_ref().is_some_and(|round| round.occluded(ray, inner, blockers))
+    }
+}
+
+impl ObvhsScene {
+    /// The first triangle in the interval of the ray `inner` in the private space, where a unit of the ray parameter is
+    /// `length` long.
+    fn closest_triangle(&self, inner: TreeRay, length: f32) -> Option<Hit> {
+        let tree = self.tree.as_ref()?;
         let mut best = (0.0, 0.0);
         let mut nearest = f32::INFINITY;
         let mut hit = RayHit::none();
@@ -154,9 +252,8 @@ impl RayQuery for ObvhsScene {
         })
     }
 
-    fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
+    fn occluded_by_triangle(&self, inner: TreeRay, blockers: SurfaceMask) -> bool {
         let Some(tree) = &self.tree else { return false };
-        let Some((inner, _)) = self.enter(ray) else { return false };
         !tree.ray_traverse_miss(inner, |ray, id| match intersect(&self.corners[id], ray) {
             Some((t, ..)) if self.identities[id].surface.intersects(blockers) => t,
             _ => f32::INFINITY,

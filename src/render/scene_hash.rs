@@ -30,6 +30,7 @@ pub fn scene_hash(scene: &PreparedScene) -> u64 {
         mesh.colors.iter().for_each(|c| h.rgb(*c));
         h.debug(&(mesh.material, mesh.first_light));
     }
+    h.debug(&scene.geometry.round);
     for i in &scene.geometry.instances {
         h.add(u64::from(i.group));
         h.floats(&i.to_world.to_cols_array());
@@ -38,8 +39,8 @@ pub fn scene_hash(scene: &PreparedScene) -> u64 {
     for (_, light) in scene.lights.iter() {
         h.floats(&[light.power()]);
         match light {
-            // Its place is hashed with its mesh.
-            Light::Triangle(_) => {}
+            // Their places are hashed with their surfaces.
+            Light::Triangle(_) | Light::Round(_) => {}
             Light::Environment(_) => environment(light, &mut h),
             other => h.debug(other),
         }

@@ -7,7 +7,7 @@ use super::bsdf::BsdfDesc;
 use super::diag::Span;
 use crate::image::Image;
 use crate::math::Rgb;
-use glam::{DMat4, Vec2, Vec3};
+use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -54,7 +54,7 @@ pub struct SceneDesc {
     pub bsdfs: Vec<BsdfDesc>,
     /// Triangles, in object space.
     pub meshes: Vec<MeshDesc>,
-    /// Meshes placed in the world.
+    /// Surfaces placed in the world.
     pub shapes: Vec<ShapeDesc>,
     /// Sets of shapes that are placed by instances only.
     pub groups: Vec<GroupDesc>,
@@ -247,12 +247,61 @@ pub struct MeshDesc {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A mesh in the world (or in its group).
+/// Shapes of a formula that rays meet as they are, without triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RoundKind {
+    /// Unit sphere around the origin.
+    Sphere,
+    /// Unit disk at z = 0, facing +z.
+    Disk,
+    /// Unit radius around z from 0 to 1, without caps, facing outwards.
+    Cylinder,
+}
+
+impl RoundKind {
+    /// True if the map leaves the shape what it is: an ellipsoid is no sphere, an elliptic or oblique cylinder no
+    /// cylinder. Disks may become ellipses: their area is stretched everywhere alike.
+    pub fn is_kept_by(self, to_world: &DMat4) -> bool {
+        // Relative difference of lengths, and cosine, up to which axes count as equally long and perpendicular.
+        const SIMILAR: f64 = 1e-6;
+        let [x, y, z] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(DVec4::truncate);
+        let equal = |a: DVec3, b: DVec3| (a.length() / b.length() - 1.0).abs() < SIMILAR;
+        let perpendicular = |a: DVec3, b: DVec3| a.normalize_or_zero().dot(b.normalize_or_zero()).abs() < SIMILAR;
+        let upright = perpendicular(x, y) && perpendicular(x, z) && perpendicular(y, z);
+        match self {
+            RoundKind::Disk => true,
+            RoundKind::Cylinder => upright && equal(x, y),
+            RoundKind::Sphere => upright && equal(x, y) && equal(x, z),
+        }
+    }
+}
+
+/// The surface of a shape, in object space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShapeGeometry {
+    /// Triangles.
+    Mesh(MeshId),
+    /// A round shape.
+    Round(RoundKind),
+}
+
+impl ShapeGeometry {
+    /// The mesh, if it is one.
+    pub fn mesh(self) -> Option<MeshId> {
+        match self {
+            ShapeGeometry::Mesh(mesh) => Some(mesh),
+            ShapeGeometry::Round(_) => None,
+        }
+    }
+}
+
+/// A surface in the world (or in its group).
 #[derive(Clone, Debug)]
 pub struct ShapeDesc {
-    /// Which triangles.
-    pub mesh: MeshId,
-    /// Object → world (or group) space.
+    /// The surface itself.
+    pub geometry: ShapeGeometry,
+    /// Object → world (or group) space. Round shapes that emit keep their kind under it (see
+    /// [`RoundKind::is_kept_by`]).
     pub to_world: DMat4,
     /// Material; `None` is Mitsuba's default, a diffuse reflectance of one half.
     pub bsdf: Option<BsdfId>,

@@ -1,6 +1,6 @@
 //! Checks of a whole scene that no single element shows: nothing to see, nothing that shines, an empty film.
 
-use super::desc::{EmitterKind, MeshDesc, SceneDesc, ShapeDesc};
+use super::desc::{EmitterKind, MeshDesc, MeshId, SceneDesc, ShapeDesc, ShapeGeometry};
 use super::diag::{Diagnostic, Diagnostics, Span};
 use glam::DMat4;
 use rayon::prelude::*;
@@ -84,7 +84,9 @@ fn transform(m: &DMat4, what: &str, span: Option<&Span>, out: &mut Diagnostics) 
 }
 
 fn meshes(scene: &SceneDesc, shapes: &[&ShapeDesc], out: &mut Diagnostics) {
-    let span_of = |mesh: usize| shapes.iter().find(|s| s.mesh.index() == mesh).and_then(|s| s.span.clone());
+    let span_of = |mesh: usize| {
+        shapes.iter().find(|s| s.geometry == ShapeGeometry::Mesh(MeshId(mesh as u32))).and_then(|s| s.span.clone())
+    };
     let (mut flat, mut first_flat) = (0u64, None);
     for (index, mesh) in scene.meshes.iter().enumerate() {
         if let Some(v) = first_broken_vertex(mesh) {
@@ -163,7 +165,7 @@ fn flat_triangles(mesh: &MeshDesc) -> (u64, usize) {
 mod tests {
     use super::*;
     use crate::math::Rgb;
-    use crate::scene::{EmitterDesc, FilmDesc, FilterDesc, FovAxis, MeshId, SensorDesc};
+    use crate::scene::{EmitterDesc, FilmDesc, FilterDesc, FovAxis, SensorDesc};
     use glam::Vec3;
 
     fn sound() -> SceneDesc {
@@ -189,7 +191,7 @@ mod tests {
                 ..MeshDesc::default()
             }],
             shapes: vec![ShapeDesc {
-                mesh: MeshId(0),
+                geometry: ShapeGeometry::Mesh(MeshId(0)),
                 to_world: DMat4::IDENTITY,
                 bsdf: None,
                 emission: None,

@@ -23,6 +23,8 @@ const STEP_OFF: f32 = 1.0;
 const OUTLIERS: f32 = 0.03;
 /// Share of what is seen that makes a part of space count; less is seen through cracks.
 const FAIR: f32 = 0.005;
+/// Points of a round light that are looked at, as pairs of uniform numbers: some may be inside of other things.
+const ROUND_PLACES: [[f32; 2]; 4] = [[0.1, 0.05], [0.4, 0.3], [0.6, 0.8], [0.9, 0.55]];
 /// A region is used if it is shorter than this share of the scene.
 const MUCH_SMALLER: f32 = 0.6;
 
@@ -52,11 +54,14 @@ pub fn places(scene: &PreparedScene) -> Places {
         }
     }
     let mut ends = vec![(scene.camera.position(), Vec3::ZERO)];
-    ends.extend(scene.lights.iter().filter_map(|(_, light)| match light {
-        Light::Triangle(l) => Some((l.corners().into_iter().sum::<Vec3>() / 3.0, l.ng())),
-        Light::Point(l) => Some((l.position(), Vec3::ZERO)),
-        Light::Spot(l) => Some((l.position(), Vec3::ZERO)),
-        Light::Directional(_) | Light::Environment(_) => None,
+    ends.extend(scene.lights.iter().flat_map(|(_, light)| match light {
+        Light::Triangle(l) => vec![(l.corners().into_iter().sum::<Vec3>() / 3.0, l.ng())],
+        Light::Round(l) => {
+            ROUND_PLACES.map(|u| l.shape().point_of(l.shape().sample_unit(u))).map(|x| (x.p, x.ng)).into()
+        }
+        Light::Point(l) => vec![(l.position(), Vec3::ZERO)],
+        Light::Spot(l) => vec![(l.position(), Vec3::ZERO)],
+        Light::Directional(_) | Light::Environment(_) => vec![],
     }));
     Places { ends, seen }
 }

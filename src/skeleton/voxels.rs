@@ -6,7 +6,7 @@
 //! well: an open scene ends there, as if the box around it were a room.
 
 use crate::math::Vec3;
-use crate::ray::Geometry;
+use crate::ray::{Geometry, RoundShape};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -52,7 +52,7 @@ impl VoxelGrid {
         let Some(mut grid) = frame(lo, hi, cells) else { return VoxelGrid::default() };
         let count = grid.dims.iter().product();
         let marks: Vec<AtomicBool> = (0..count).map(|_| AtomicBool::new(false)).collect();
-        geometry.for_each_placed(|mesh, _, to_world| {
+        geometry.for_each_placed_mesh(|mesh, _, to_world| {
             let buffers = &geometry.meshes[mesh as usize];
             buffers.triangles.par_iter().with_min_len(CHUNK).for_each(|corners| {
                 let corners = corners.map(|i| {
@@ -62,6 +62,9 @@ impl VoxelGrid {
                 // Marks are only ever set: the result is the same in any order.
                 mark_triangle(corners, grid.dims, |i| marks[i].store(true, Ordering::Relaxed));
             });
+        });
+        geometry.for_each_placed_round(|_, _, shape| {
+            mark_round(&grid, &shape, |i| marks[i].store(true, Ordering::Relaxed));
         });
         grid.solid = marks.into_iter().map(AtomicBool::into_inner).collect();
         for i in 0..count {
@@ -163,6 +166,26 @@ fn frame(lo: Vec3, hi: Vec3, cells: usize) -> Option<VoxelGrid> {
     }
 }
 
+/// Calls `mark` for every cube that the round shape touches, and for some next to it.
+fn mark_round(grid: &VoxelGrid, shape: &RoundShape, mut mark: impl FnMut(usize)) {
+    let (lo, hi) = shape.bounds();
+    let range = |axis: usize| {
+        let cube = |x: f32, offset: f32| ((x - grid.lo[axis]) / grid.cell + offset).floor().max(0.0) as usize;
+        (cube(lo[axis], -INFLATION), cube(hi[axis], INFLATION).min(grid.dims[axis] - 1))
+    };
+    let [(x0, x1), (y0, y1), (z0, z1)] = [0, 1, 2].map(range);
+    // The ball around a cube.
+    let radius = f64::from(grid.cell) * f64::from(0.5 + INFLATION) * 3f64.sqrt();
+    for (z, y) in (z0..=z1).flat_map(|z| (y0..=y1).map(move |y| (z, y))) {
+        for x in x0..=x1 {
+            let centre = grid.lo + Vec3::new(x as f32 + 0.5, y as f32 + 0.5, z as f32 + 0.5) * grid.cell;
+            if shape.may_touch_ball(centre.as_dvec3(), radius) {
+                mark(x + grid.dims[0] * (y + grid.dims[1] * z));
+            }
+        }
+    }
+}
+
 /// Calls `mark` for every cube that the triangle touches; `corners` in cubes from the grid's corner.
 fn mark_triangle(corners: [Vec3; 3], dims: [usize; 3], mut mark: impl FnMut(usize)) {
     let half = 0.5 + INFLATION;
@@ -248,7 +271,8 @@ mod tests {
         };
         let meshes = vec![mesh(20), mesh(10)];
         let to_world = Affine3A::from_rotation_y(0.7) * Affine3A::from_scale(Vec3::new(1.0, 2.0, 0.5));
-        Geometry { meshes, world: vec![0], groups: vec![vec![1]], instances: vec![Instance { group: 0, to_world }] }
+        let instances = vec![Instance { group: 0, to_world }];
+        Geometry { meshes, world: vec![0], groups: vec![vec![1]], instances, ..Geometry::default() }
     }
 
     #[test]
@@ -258,7 +282,7 @@ mod tests {
             let grid = VoxelGrid::of_geometry(&geometry, 40);
             let mut near = vec![false; grid.len()];
             let mut rng = HashRng::new(seed, 1, 0, 0);
-            geometry.for_each_placed(|mesh, _, to_world| {
+            geometry.for_each_placed_mesh(|mesh, _, to_world| {
                 let mesh = &geometry.meshes[mesh as usize];
                 for t in 0..mesh.triangles.len() as u32 {
                     let c = mesh.corners(t).map(|p| to_world.map_or(p, |m| m.transform_point3(p)));

@@ -20,6 +20,7 @@ mod outputs;
 mod rays;
 mod regression;
 mod resampling;
+mod round;
 mod scale;
 mod scene_files;
 mod stress;

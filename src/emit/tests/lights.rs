@@ -49,7 +49,7 @@ fn direct_densities_agree_with_their_samples() {
                 assert!((s.wi.length() - 1.0).abs() < 1e-5 && s.radiance.is_finite(), "{name}");
                 assert_eq!(s.delta, light.is_delta(), "{name}");
                 assert_eq!(s.distance.is_infinite(), light.is_infinite(), "{name}");
-                let pdf = light.pdf_direct(from, s.wi, s.distance);
+                let pdf = light.pdf_direct(from, s.end.normal(), s.wi, s.distance);
                 if s.delta {
                     assert_eq!((s.pdf.0, pdf.0), (1.0, 0.0), "{name}");
                     continue;
@@ -60,6 +60,11 @@ fn direct_densities_agree_with_their_samples() {
                         assert!((from + s.wi * s.distance - p).abs().max_element() < 1e-5 * (1.0 + s.distance));
                         assert!(ng.dot(s.wi) < 0.0 && error > 0.0 && error < 1e-5);
                         barycentrics(t.corners(), p)
+                    }
+                    (Light::Round(l), EmitterVertex::Surface { p, error, ng }) => {
+                        assert!((from + s.wi * s.distance - p).abs().max_element() < 1e-5 * (1.0 + s.distance));
+                        assert!(ng.dot(s.wi) < 1e-6 && error > 0.0 && error < 1e-5);
+                        l.shape().code_of(p)
                     }
                     _ => [0.0; 2],
                 };
@@ -139,7 +144,7 @@ fn directions_to_environments_are_distributed_as_their_density() {
             let z = 1.0 - 2.0 * (y as f32 + 0.5) / side[1] as f32;
             let (sin, cos) = (std::f32::consts::TAU * (x as f32 + 0.5) / side[0] as f32).sin_cos();
             let r = (1.0 - z * z).sqrt();
-            let pdf = light.pdf_direct(Vec3::ZERO, Vec3::new(r * cos, r * sin, z), f32::INFINITY);
+            let pdf = light.pdf_direct(Vec3::ZERO, Vec3::ZERO, Vec3::new(r * cos, r * sin, z), f32::INFINITY);
             expected[y / SUB * BINS[0] + x / SUB] +=
                 f64::from(pdf.0) * 4.0 * std::f64::consts::PI / (side[0] * side[1]) as f64;
         }
@@ -301,7 +306,7 @@ fn emission_carries_the_power_and_agrees_with_its_densities() {
                 (light.delta_position(), light.delta_direction()),
                 "{name}"
             );
-            let (position, direction) = light.pdf_emission_at_vertex(s.direction);
+            let (position, direction) = light.pdf_emission_at_vertex(s.end.normal(), s.direction);
             assert!((position.0 / s.pdf_position.0 - 1.0).abs() < 1e-6, "{name}");
             assert!((direction.0 / s.pdf_direction.0 - 1.0).abs() < 1e-3, "{name} {direction:?} {:?}", s.pdf_direction);
             if let (true, EmitterVertex::Infinite) = (light.is_infinite(), s.end) {
@@ -357,7 +362,7 @@ fn no_reference_point_makes_nan() {
                     assert!(s.pdf.0 > 0.0 && s.pdf.0.is_finite(), "{name} {from}");
                 }
                 let wi = random_direction(&mut rng);
-                let pdf = light.pdf_direct(from, wi, 1.0).0;
+                let pdf = light.pdf_direct(from, random_direction(&mut rng), wi, 1.0).0;
                 assert!(pdf >= 0.0 && pdf.is_finite(), "{name} {from} {pdf}");
                 if let Some(e) = light.sample_emission(u, u) {
                     assert!(e.origin.is_finite() && e.direction.is_finite() && e.flux().is_finite(), "{name}");

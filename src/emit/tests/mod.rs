@@ -4,11 +4,14 @@ mod camera;
 mod choice;
 mod lights;
 mod mitsuba;
+mod round;
 
 use super::*;
 use crate::image::{Image, Pixels};
 use crate::math::hash::HashRng;
 use crate::math::{DMat4, DVec3, Rgb, Vec2, Vec3};
+use crate::ray::{RoundShape, SurfaceMask};
+use crate::scene::RoundKind;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::Arc;
 
@@ -107,6 +110,10 @@ fn all_lights() -> Vec<(&'static str, Light)> {
     vec![
         ("triangle", Light::Triangle(triangle(corners, Rgb::new(2.0, 1.0, 0.5)))),
         ("textured", Light::Triangle(TriangleLight::new(corners.map(Vec3::from), true, emission))),
+        ("sphere", round(RoundKind::Sphere, false)),
+        ("textured sphere", round(RoundKind::Sphere, true)),
+        ("disk", round(RoundKind::Disk, true)),
+        ("cylinder", round(RoundKind::Cylinder, true)),
         ("point", Light::Point(PointLight::new(DVec3::new(0.3, 0.2, 1.1), Rgb::new(1.0, 2.0, 3.0), DVec3::ZERO))),
         ("spot", Light::Spot(Box::new(spot))),
         ("directional", Light::Directional(directional)),
@@ -118,6 +125,18 @@ fn all_lights() -> Vec<(&'static str, Light)> {
         ("sun", environment(sun_sky(0.0, 1.0))),
         ("sun and sky", environment(sun_sky(1.0, 0.001))),
     ]
+}
+
+fn round(kind: RoundKind, textured: bool) -> Light {
+    let to_world =
+        DMat4::from_translation(DVec3::new(0.2, -0.1, 1.5)) * tilted() * DMat4::from_scale(DVec3::splat(0.4));
+    let shape = RoundShape::new(kind, to_world, kind == RoundKind::Disk, SurfaceMask::BLOCKERS);
+    let emission = if textured {
+        RoundEmission::Textured(Arc::new(Ramp))
+    } else {
+        RoundEmission::Constant(Rgb::new(2.0, 1.0, 0.5))
+    };
+    Light::Round(Box::new(RoundLight::new(shape, emission)))
 }
 
 /// Numbers of one test.

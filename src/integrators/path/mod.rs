@@ -232,6 +232,8 @@ struct EmitterHit<'a> {
     index: u32,
     /// Unit direction from the vertex before to the light.
     direction: Vec3,
+    /// Unit normal of the light there; zero at infinity.
+    ng: Vec3,
     /// Throughput times emitted radiance.
     raw: Rgb,
     edge: &'a Edge,
@@ -278,12 +280,12 @@ impl<'a> Gather<'a> {
     /// Adds the light of a hit.
     #[inline]
     fn hit(&mut self, hit: &EmitterHit) {
-        let EmitterHit { light, index, direction, raw, edge } = *hit;
+        let EmitterHit { light, index, direction, ng, raw, edge } = *hit;
         // No other technique finds what the camera sees, or what follows a delta event.
         let weight = if index == 1 || edge.delta {
             1.0
         } else {
-            let next_event = next_event_pdf(self.scene, light, edge, self.normal_before, direction);
+            let next_event = next_event_pdf(self.scene, light, edge, self.normal_before, ng, direction);
             self.rules.heuristic.weight(edge.pdf_with_survival(), next_event)
         };
         self.record((0, index as usize + 1), raw, weight, true);
@@ -314,8 +316,8 @@ impl WalkHooks for Gather<'_> {
         if !self.hidden(index)
             && let Some((light, emitted)) = emitted_at(scene, vertex)
         {
-            let (direction, raw) = (-vertex.wo, vertex.throughput * emitted);
-            self.hit(&EmitterHit { light, index, direction, raw, edge: vertex.edge });
+            let (direction, raw, ng) = (-vertex.wo, vertex.throughput * emitted, vertex.place.normal());
+            self.hit(&EmitterHit { light, index, direction, ng, raw, edge: vertex.edge });
         }
         if vertex.scatter.is_black() {
             return false;
@@ -335,7 +337,8 @@ impl WalkHooks for Gather<'_> {
             return;
         }
         for_each_background(self.scene, direction, |light, emitted| {
-            self.hit(&EmitterHit { light, index, direction, raw: throughput * emitted, edge });
+            let raw = throughput * emitted;
+            self.hit(&EmitterHit { light, index, direction, ng: Vec3::ZERO, raw, edge });
         });
     }
 }

@@ -10,12 +10,34 @@ use crate::load::primitives::Primitive;
 use crate::math::{Frame, Rgb};
 use crate::scene::diag::Diagnostic;
 use crate::scene::{
-    AreaEmission, BsdfDesc, BsdfId, ColorDesc, DiffuseParams, GroupDesc, GroupId, InstanceDesc, ShapeDesc,
+    AreaEmission, BsdfDesc, BsdfId, ColorDesc, DiffuseParams, GroupDesc, GroupId, InstanceDesc, RoundKind, ShapeDesc,
+    ShapeGeometry,
 };
 use glam::{DMat4, DVec3};
 
 const PLUGINS: [&str; 10] =
     ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance"];
+
+/// A surface of a shape, as long as its file is not read.
+enum Source {
+    Mesh(MeshSource),
+    Round(RoundKind),
+}
+
+impl Source {
+    /// A round shape that emits is one light, sampled by formulas of its kind. Where its place makes an ellipsoid or an
+    /// elliptic cylinder of it, triangles emit.
+    fn for_placement(self, to_world: &DMat4, emits: bool) -> Source {
+        match self {
+            Source::Round(kind) if emits && !kind.is_kept_by(to_world) => match kind {
+                RoundKind::Sphere => Source::Mesh(MeshSource::Primitive(Primitive::Sphere)),
+                RoundKind::Cylinder => Source::Mesh(MeshSource::Primitive(Primitive::Cylinder)),
+                RoundKind::Disk => self,
+            },
+            other => other,
+        }
+    }
+}
 
 impl Builder<'_> {
     /// A `<shape>` that stands in the scene itself.
@@ -107,27 +129,27 @@ impl Builder<'_> {
                 p.ignore(&["max_smooth_angle", "collapse", "srgb"]);
                 let (path, place) = self.file(p, "filename")?;
                 span = place;
-                match p.plugin {
+                Source::Mesh(match p.plugin {
                     "ply" => MeshSource::Ply(path),
                     "obj" => MeshSource::Obj(path),
                     _ => {
                         let index = p.count("shape_index").unwrap_or(0);
                         MeshSource::Serialized(path, index)
                     }
-                }
+                })
             }
-            "rectangle" => MeshSource::Primitive(Primitive::Rectangle),
-            "cube" => MeshSource::Primitive(Primitive::Cube),
-            "disk" => MeshSource::Primitive(Primitive::Disk),
+            "rectangle" => Source::Mesh(MeshSource::Primitive(Primitive::Rectangle)),
+            "cube" => Source::Mesh(MeshSource::Primitive(Primitive::Cube)),
+            "disk" => Source::Round(RoundKind::Disk),
             "sphere" => {
                 let center = p.vector("center").unwrap_or(DVec3::ZERO);
                 let radius = p.positive_or("radius", 1.0);
                 to_world *= DMat4::from_translation(center) * DMat4::from_scale(DVec3::splat(radius));
-                MeshSource::Primitive(Primitive::Sphere)
+                Source::Round(RoundKind::Sphere)
             }
             "cylinder" => {
                 to_world *= cylinder_to_object(p)?;
-                MeshSource::Primitive(Primitive::Cylinder)
+                Source::Round(RoundKind::Cylinder)
             }
             _ => {
                 self.unknown_plugin(p, &PLUGINS);
@@ -165,9 +187,13 @@ impl Builder<'_> {
             self.scene.bsdfs.push(BsdfDesc { name: None, kind, span: None });
             bsdf = Some(BsdfId((self.scene.bsdfs.len() - 1) as u32));
         }
-        let mesh = self.assets.mesh(source, options, span);
+        let source = source.for_placement(&to_world, emission.is_some());
+        let geometry = match source {
+            Source::Round(kind) => ShapeGeometry::Round(kind),
+            Source::Mesh(mesh) => ShapeGeometry::Mesh(self.assets.mesh(mesh, options, span)),
+        };
         let name = p.element().attr("id").map(|a| a.value.clone());
-        Some(ShapeDesc { mesh, to_world, bsdf, emission, flip_normals, name, span: Some(p.span()) })
+        Some(ShapeDesc { geometry, to_world, bsdf, emission, flip_normals, name, span: Some(p.span()) })
     }
 
     fn area_emission(&mut self, node: usize) -> Option<AreaEmission> {

@@ -454,12 +454,27 @@ fn equal_meshes_are_kept_once_and_mirrored_ones_apart() {
         "<shape type=\"cube\"/><shape type=\"cube\">{mirror}</shape><shape type=\"shapegroup\" id=\"g\"><shape type=\"sphere\"/></shape>\
          <shape type=\"instance\"><ref id=\"g\"/>{mirror}</shape><shape type=\"instance\"><ref id=\"g\"/></shape>"
     ));
-    assert_eq!((s.meshes.len(), s.shapes.len(), s.groups.len(), s.instances.len()), (3, 3, 1, 2));
-    assert_eq!(s.shapes[0].mesh, s.shapes[1].mesh);
+    assert_eq!((s.meshes.len(), s.shapes.len(), s.groups.len(), s.instances.len()), (2, 3, 1, 2));
+    assert_eq!(s.shapes[0].geometry, s.shapes[1].geometry);
     // In the world the front is outside all the same.
-    let m = &s.meshes[s.shapes[2].mesh.index()];
+    let m = &s.meshes[s.shapes[2].geometry.mesh().unwrap().index()];
     let [a, b, c] = m.triangles[0].map(|i| s.shapes[2].to_world.transform_point3(m.positions[i as usize].as_dvec3()));
     assert!((b - a).cross(c - a).dot(a) > 0.0);
+}
+
+/// Only round shapes that emit and are stretched are made of triangles.
+#[test]
+fn round_shapes_stay_round() {
+    let stretched = "<transform name=\"to_world\"><scale x=\"2\"/></transform>";
+    let light = "<emitter type=\"area\"/>";
+    let shape = |kind: &str, inside: &str| format!("<shape type=\"{kind}\">{inside}</shape>");
+    for kind in ["sphere", "disk", "cylinder"] {
+        for (inside, round) in [(stretched, true), (light, true), (&*format!("{stretched}{light}"), kind == "disk")] {
+            let s = good(&shape(kind, inside));
+            let found = s.shapes.last().unwrap().geometry;
+            assert_eq!(matches!(found, ShapeGeometry::Round(_)), round, "{kind} {inside}");
+        }
+    }
 }
 
 #[test]
@@ -505,7 +520,7 @@ proptest! {
         match load_scene(&path, &LoadOptions::default()) {
             Ok((s, found)) => {
                 prop_assert!(!found.has_errors());
-                prop_assert!(s.shapes.iter().all(|shape| shape.mesh.index() < s.meshes.len() && shape.bsdf.is_none_or(|b| b.index() < s.bsdfs.len())));
+                prop_assert!(s.shapes.iter().all(|shape| shape.geometry.mesh().is_none_or(|m| m.index() < s.meshes.len()) && shape.bsdf.is_none_or(|b| b.index() < s.bsdfs.len())));
             }
             Err(e) => {
                 prop_assert!(e.diagnostics.has_errors());
