@@ -48,6 +48,7 @@ impl<'a> Session<'a> {
         outputs.check()?;
         let all = || REGISTRY.iter().map(|s| s.name).collect::<Vec<_>>().join(",");
         let methods = methods(args, &args.integrators.clone().unwrap_or_else(all))?;
+        check_params(args, &methods)?;
         let environment = Environment::new(args.threads, args.quiet)?;
         environment.console.catch_ctrl_c();
         let session = Session { args, methods, environment, outputs };
@@ -118,24 +119,24 @@ pub(crate) fn is_complete(method: &Method, scene: &PreparedScene) -> bool {
 /// Reads methods, which must exist, and gives them the parameters that hold for all methods.
 fn methods(args: &MeasureArgs, text: &str) -> Result<Vec<MethodRequest>, Failure> {
     let mut methods = parse_methods(text).map_err(Failure::Input)?;
-    let mut used = vec![false; args.param.len()];
     for method in &mut methods {
         method.max_depth = args.max_depth;
         let Some(name) = &method.integrator else { continue };
         let spec = find_integrator(name)?;
         // A method's own parameters come after those of all methods.
-        let mut own = std::mem::take(&mut method.params);
-        for (pair, used) in args.param.iter().zip(&mut used) {
-            if spec.has_param(&pair.0) {
-                method.params.push(pair.clone());
-                *used = true;
-            }
-        }
-        method.params.append(&mut own);
+        let own = std::mem::take(&mut method.params);
+        let common = args.param.iter().filter(|(key, _)| spec.has_param(key)).cloned();
+        method.params = common.chain(own).collect();
     }
-    match args.param.iter().zip(used).find(|(_, used)| !used) {
-        Some(((key, _), _)) => Err(Failure::Input(format!("-p {key}: none of the methods has this parameter"))),
-        None => Ok(methods),
+    Ok(methods)
+}
+
+/// Refuses parameters of all methods that none of them has.
+fn check_params(args: &MeasureArgs, methods: &[MethodRequest]) -> Result<(), Failure> {
+    let has = |method: &MethodRequest, key: &str| method.params.iter().any(|(k, _)| k == key);
+    match args.param.iter().find(|(key, _)| !methods.iter().any(|m| has(m, key))) {
+        Some((key, _)) => Err(Failure::Input(format!("-p {key}: none of the methods has this parameter"))),
+        None => Ok(()),
     }
 }
 
