@@ -160,8 +160,10 @@ fn run_tiny(integrator: &str, iterations: u64, checkpoint: Option<&Path>, resume
         POOL.get_or_init(|| rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started"));
     let spec = find_integrator(integrator).expect("an integrator of that name");
     let mut params = Params::defaults(spec);
-    // Of those that have it: few light sub-paths are enough.
-    let _ = params.set("presampled_paths", "16");
+    // Few light sub-paths and voxels are enough; integrators without these parameters refuse them.
+    for (key, value) in [("presampled_paths", "16"), ("voxel_resolution", "12")] {
+        let _ = params.set(key, value);
+    }
     let plan = Plan {
         budget: Budget { iterations: Some(iterations), time: None },
         checkpoint: checkpoint.map(Path::to_owned),
