@@ -58,6 +58,9 @@ pub(crate) struct SceneArgs {
     /// Treat missing textures as errors, and non-finite samples as failure
     #[arg(long)]
     pub strict: bool,
+    /// Render without what is not supported, with a warning
+    #[arg(long)]
+    pub force: bool,
     /// Camera position, for scenes without a camera (OBJ, PLY)
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     pub camera_origin: Option<[f64; 3]>,

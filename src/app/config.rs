@@ -21,7 +21,7 @@ impl SceneArgs {
             fov: self.camera_fov,
             resolution: None,
         };
-        let options = LoadOptions { definitions: self.define.clone(), strict: self.strict, camera };
+        let options = LoadOptions { definitions: self.define.clone(), strict: self.strict, force: self.force, camera };
         SceneRequest { file: self.scene.clone(), options }
     }
 }
@@ -45,7 +45,7 @@ impl SampleArgs {
 impl MeasureArgs {
     /// A scene file with the definitions of the command line.
     pub fn scene_request(&self, file: &Path) -> SceneRequest {
-        let options = LoadOptions { definitions: self.define.clone(), ..LoadOptions::default() };
+        let options = LoadOptions { definitions: self.define.clone(), force: self.force, ..LoadOptions::default() };
         SceneRequest { file: file.to_owned(), options }
     }
 

@@ -18,6 +18,9 @@ pub(crate) struct MeasureArgs {
     /// Set a variable of the scene file
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = pair)]
     pub define: Vec<(String, String)>,
+    /// Render without what is not supported in a scene, with a warning
+    #[arg(long)]
+    pub force: bool,
     /// Picture size instead of the scene's
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,

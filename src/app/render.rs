@@ -85,6 +85,12 @@ fn summarise(finished: &Finished, args: &RenderArgs) {
             note!("  pixel {},{} iteration {}: {}", p.x, p.y, p.iteration, p.source.name());
         }
     }
+    if !stats.scene_changes.is_empty() {
+        note!("warning: the picture is another than the scene file asks for:");
+        for line in &stats.scene_changes {
+            note!("  {line}");
+        }
+    }
     for path in &finished.written {
         note!("wrote {}", path.display());
     }

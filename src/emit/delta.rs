@@ -1,10 +1,12 @@
 //! Lights without extent: point, spot, directional.
 
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
-use super::{EmitError, in_range};
+use super::{EmitError, RadianceTexture, in_range};
 use crate::math::warp::{SPHERE_PDF, cone_pdf, square_to_cone, square_to_sphere, versine};
-use crate::math::{AreaPdf, DMat4, DVec3, Frame, Rgb, SolidAnglePdf, Vec3};
+use crate::math::{AreaPdf, DMat4, DVec3, Frame, Rgb, SolidAnglePdf, Vec2, Vec3};
+use glam::{DMat3, Mat3};
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 use super::environment::disk_before_scene;
 
@@ -85,6 +87,44 @@ impl PointLight {
     }
 }
 
+/// A texture that a spot light projects.
+#[derive(Clone, Debug)]
+pub struct Projection {
+    texture: Arc<dyn RadianceTexture>,
+    /// World directions to the light's space, which has the axis along +z.
+    world_to_light: Mat3,
+    /// Half the side of the textured square at distance one.
+    half_side: f32,
+}
+
+impl Projection {
+    /// The texture laid over the square that just holds the cone of half angle `cutoff_angle` (degrees, < 90) around +z
+    /// of the space of `to_world`; u runs along +x, v along +y.
+    ///
+    /// # Errors
+    /// If the transform cannot be inverted, or the cone is too wide.
+    pub fn new(texture: Arc<dyn RadianceTexture>, to_world: DMat4, cutoff_angle: f32) -> Result<Projection, EmitError> {
+        let cutoff = f64::from(cutoff_angle);
+        in_range("cutoff_angle", cutoff, cutoff > 0.0 && cutoff < 90.0, "between 0 and 90 degrees with a texture")?;
+        let world_to_light = DMat3::from_mat4(to_world).inverse();
+        if !world_to_light.is_finite() {
+            return Err(EmitError::Transform("spot light"));
+        }
+        Ok(Projection {
+            texture,
+            world_to_light: world_to_light.as_mat3(),
+            half_side: cutoff.to_radians().tan() as f32,
+        })
+    }
+
+    /// The colour that the world direction `wo` gets.
+    fn at(&self, wo: Vec3) -> Rgb {
+        let local = self.world_to_light * wo;
+        let scale = 0.5 / (local.z * self.half_side);
+        self.texture.at(Vec2::new(0.5 + local.x * scale, 0.5 + local.y * scale))
+    }
+}
+
 /// A point that shines into a cone: full strength up to one angle, then falling linearly in the angle to zero
 /// (Mitsuba's `spot`).
 #[derive(Clone, Debug)]
@@ -98,6 +138,9 @@ pub struct SpotLight {
     versine_cutoff: f32,
     /// 1 − cos of `beam`.
     versine_beam: f32,
+    projection: Option<Projection>,
+    /// Luminance of the flux with a projected texture.
+    projected_power: f32,
 }
 
 /// Smallest half angle of a spot in degrees. The spacing of unit vectors in single precision is a hundredth of it.
@@ -108,6 +151,9 @@ fn one_minus_sinc(x: f64) -> f64 {
     let x2 = x * x;
     if x2 < 1e-2 { x2 / 6.0 * (1.0 - x2 / 20.0 * (1.0 - x2 / 42.0 * (1.0 - x2 / 72.0))) } else { 1.0 - x.sin() / x }
 }
+
+/// Steps in either direction of the grid over the cone on which the power of a projected texture is summed.
+const POWER_GRID: usize = 128;
 
 impl SpotLight {
     /// Along +z of the space of `to_world`; half angles in degrees, 0.0005 ≤ `cutoff_angle` < 180. A beam wider than the
@@ -138,7 +184,32 @@ impl SpotLight {
         let (cutoff, beam) = (cutoff_angle.to_radians(), beam_width.min(cutoff_angle).to_radians());
         let frame = Frame::from_normal(axis.normalize());
         let [versine_cutoff, versine_beam] = [cutoff, beam].map(|angle| versine(f64::from(angle)) as f32);
-        Ok(SpotLight { position, frame, intensity, cutoff, beam, versine_cutoff, versine_beam })
+        Ok(SpotLight {
+            position,
+            frame,
+            intensity,
+            cutoff,
+            beam,
+            versine_cutoff,
+            versine_beam,
+            projection: None,
+            projected_power: 0.0,
+        })
+    }
+
+    /// The same light with a projected texture, which multiplies the intensity.
+    pub fn with_projection(self, projection: Projection) -> SpotLight {
+        let mut light = SpotLight { projection: Some(projection), ..self.clone() };
+        let directions = (0..POWER_GRID * POWER_GRID).map(|i| {
+            let u = [i % POWER_GRID, i / POWER_GRID].map(|i| (i as f32 + 0.5) / POWER_GRID as f32);
+            light.frame.to_world(square_to_cone(u, light.versine_cutoff)).normalize()
+        });
+        let sum: f64 = directions.map(|wo| f64::from(light.intensity(wo).luminance())).sum();
+        let solid_angle = 2.0 * std::f64::consts::PI * f64::from(light.versine_cutoff);
+        // Never zero because a bright spot of the texture lies between the points of the grid.
+        let least = light.projection.as_ref().map_or(0.0, |p| 1e-3 * self.power() * p.texture.mean().luminance());
+        light.projected_power = ((sum / (POWER_GRID * POWER_GRID) as f64 * solid_angle) as f32).max(least);
+        light
     }
 
     /// Position, relative to the scene's centre.
@@ -165,17 +236,25 @@ impl SpotLight {
     pub fn intensity(&self, wo: Vec3) -> Rgb {
         let versine = self.versine_of(wo);
         if versine >= self.versine_cutoff {
-            Rgb::BLACK
-        } else if versine <= self.versine_beam {
-            self.intensity
+            return Rgb::BLACK;
+        }
+        let intensity = match &self.projection {
+            None => self.intensity,
+            Some(projection) => self.intensity * projection.at(wo),
+        };
+        if versine <= self.versine_beam {
+            intensity
         } else {
             let angle = 2.0 * (0.5 * versine).sqrt().min(1.0).asin();
-            self.intensity * ((self.cutoff - angle) / (self.cutoff - self.beam)).clamp(0.0, 1.0)
+            intensity * ((self.cutoff - angle) / (self.cutoff - self.beam)).clamp(0.0, 1.0)
         }
     }
 
     /// See [`super::Light::power`].
     pub fn power(&self) -> f32 {
+        if self.projection.is_some() {
+            return self.projected_power;
+        }
         // ∫ I dω in closed form: the full cone, and by parts the ramp ∫ (c − θ) / (c − b) sin θ dθ. Together that is
         // 2π (1 − (sin c − sin b) / (c − b)), written with the middle of both angles and half of their difference so
         // that nothing cancels.

@@ -25,7 +25,7 @@ pub mod triangle;
 mod tests;
 
 pub use camera::{Camera, CameraRay, LensSample};
-pub use delta::{DirectionalLight, PointLight, SpotLight};
+pub use delta::{DirectionalLight, PointLight, Projection, SpotLight};
 pub use environment::{Environment, EnvironmentLight};
 pub use envmap::EnvMap;
 pub use filter::PixelFilter;

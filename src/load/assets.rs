@@ -1,6 +1,6 @@
 //! Files that a scene names: remembered while the text is read, each once, and decoded in parallel afterwards.
 
-use super::mesh::{Dropped, LoadedMesh, MeshError, MeshOptions};
+use super::mesh::{Dropped, LoadedMesh, MeshColors, MeshError, MeshOptions};
 use super::primitives::Primitive;
 use super::report::Report;
 use super::{obj, ply, serialized};
@@ -158,10 +158,15 @@ impl Assets {
         jobs.iter().filter_map(|(source, ..)| source.path()).for_each(|path| report.opened(path));
         self.add_images(images, scene, report);
         scene.meshes.reserve(meshes.len());
-        for (mesh, (source, _, span)) in meshes.into_iter().zip(jobs) {
+        for (mesh, (source, options, span)) in meshes.into_iter().zip(jobs) {
             let path = source.path().cloned().unwrap_or_default();
             scene.meshes.push(match mesh {
                 Ok(loaded) => {
+                    if options.colors != MeshColors::Unused && loaded.mesh.colors.is_empty() {
+                        let (name, attribute) = (&loaded.mesh.name, options.colors.attribute());
+                        let message = format!("a texture asks for `{attribute}`, which `{name}` does not have");
+                        report.push(Diagnostic::error("load::missing-attribute", message).at(span.clone()));
+                    }
                     for message in loaded.dropped.messages(&path) {
                         report.push(Diagnostic::warning("load::mesh", message).at(span.clone()));
                     }

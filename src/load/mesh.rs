@@ -1,6 +1,7 @@
 //! Common parts of all mesh readers: options, errors, and the repairs every mesh gets before it enters a scene.
 
 use super::normals;
+use crate::math::Rgb;
 use crate::scene::MeshDesc;
 use std::fmt;
 use std::path::Path;
@@ -13,9 +14,34 @@ pub(super) struct MeshOptions {
     /// Texture v becomes 1 − v. Pictures have v = 0 at their *top* row here, as in Mitsuba 3; OBJ files have it at the
     /// bottom.
     pub flip_v: bool,
+    /// Which colours of the file a texture needs.
+    pub colors: MeshColors,
     /// The mesh is placed by a transform that mirrors. Vertex normals of the file keep their meaning then (they go with
     /// the inverse transpose), while the winding turns round: it is reversed here so that both stay on one side.
     pub mirrored: bool,
+}
+
+/// Colours of a mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) enum MeshColors {
+    /// None is needed.
+    #[default]
+    Unused,
+    /// One for each vertex.
+    Vertex,
+    /// One for each face.
+    Face,
+}
+
+impl MeshColors {
+    /// Name of the attribute in scene files; empty if none is needed.
+    pub(super) fn attribute(self) -> &'static str {
+        match self {
+            MeshColors::Unused => "",
+            MeshColors::Vertex => "vertex_color",
+            MeshColors::Face => "face_color",
+        }
+    }
 }
 
 /// A mesh as read.
@@ -126,6 +152,20 @@ pub(super) fn finish(mesh: &mut MeshDesc, options: MeshOptions) {
             reverse_winding(mesh);
         }
     }
+}
+
+/// Gives every triangle vertices of its own, all in the triangle's colour.
+pub(super) fn color_faces(mesh: &mut MeshDesc, colors: &[Rgb]) {
+    let corners: Vec<usize> = mesh.triangles.iter().flatten().map(|&i| i as usize).collect();
+    mesh.positions = corners.iter().map(|&i| mesh.positions[i]).collect();
+    if !mesh.normals.is_empty() {
+        mesh.normals = corners.iter().map(|&i| mesh.normals[i]).collect();
+    }
+    if !mesh.uvs.is_empty() {
+        mesh.uvs = corners.iter().map(|&i| mesh.uvs[i]).collect();
+    }
+    mesh.colors = colors.iter().flat_map(|&c| [c; 3]).collect();
+    mesh.triangles = (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
 }
 
 /// Turns every triangle round.

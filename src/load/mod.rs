@@ -31,6 +31,8 @@ pub struct LoadOptions {
     pub definitions: Vec<(String, String)>,
     /// A missing or unreadable picture is an error instead of a magenta stand-in with a warning.
     pub strict: bool,
+    /// What is not supported and would change the picture is a warning instead of an error.
+    pub force: bool,
     /// Camera for files that have none (OBJ, PLY).
     pub camera: CameraOptions,
 }
@@ -93,7 +95,7 @@ impl std::error::Error for LoadFailure {}
 /// # Errors
 /// With every error found in the file and the files it names, up to a limit of twenty.
 pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<(SceneDesc, Diagnostics), LoadFailure> {
-    let mut report = Report::new();
+    let mut report = Report::new(options.force);
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let mut scene = match ending.as_str() {
         "xml" => mitsuba::load(path, options, &mut report),

@@ -12,6 +12,8 @@ pub(super) const MAX_ERRORS: usize = 20;
 /// Diagnostics of one load.
 #[derive(Debug, Default)]
 pub(super) struct Report {
+    /// What is not supported is a warning instead of an error.
+    force: bool,
     diagnostics: Diagnostics,
     errors: usize,
     io: bool,
@@ -22,13 +24,17 @@ pub(super) struct Report {
 }
 
 impl Report {
-    pub(super) fn new() -> Report {
-        Report::default()
+    /// With `force`, what is not supported is a warning instead of an error.
+    pub(super) fn new(force: bool) -> Report {
+        Report { force, ..Report::default() }
     }
 
     /// Adds a message, once for each place (an object that several others refer to is read for each of them); errors
     /// beyond the limit are counted only.
-    pub(super) fn push(&mut self, d: Diagnostic) {
+    pub(super) fn push(&mut self, mut d: Diagnostic) {
+        if self.force && d.changes_picture {
+            d.severity = d.severity.min(Severity::Warning);
+        }
         if let Some(span) = &d.span {
             let file = Arc::as_ptr(&span.source) as usize;
             if !self.seen.insert((d.code, d.message.clone(), file, span.range.start)) {

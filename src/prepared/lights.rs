@@ -4,7 +4,7 @@
 use super::MeshShading;
 use super::placing::PlacedScene;
 use crate::emit::{
-    DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, PointLight, RadianceTexture,
+    DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, PointLight, Projection, RadianceTexture,
     RoundEmission, RoundLight, SpotLight, SunSky, SunSkyParams, TexturedEmission, TriangleEmission, TriangleLight,
 };
 use crate::math::{DVec3, Rgb, Vec2};
@@ -40,12 +40,12 @@ pub(super) fn all_lights(
         }
     }
     for emitter in &desc.emitters {
-        lights.push(emitter_light(emitter, &desc.images, extent)?);
+        lights.push(emitter_light(emitter, &desc.images, textures, extent)?);
     }
     Ok(lights)
 }
 
-/// A texture as the emission of a surface.
+/// A texture as the emission of a surface or the picture that a spot light projects.
 #[derive(Debug)]
 struct Emission(ColorTexture);
 
@@ -102,12 +102,22 @@ fn triangle_lights(
     }
 }
 
-fn emitter_light(emitter: &EmitterDesc, images: &[ImageDesc], extent: Extent) -> Result<Light, EmitError> {
+fn emitter_light(
+    emitter: &EmitterDesc,
+    images: &[ImageDesc],
+    textures: &TextureSet,
+    extent: Extent,
+) -> Result<Light, EmitError> {
     let Extent { centre, radius } = extent;
     Ok(match &emitter.kind {
         EmitterKind::Point { position, intensity } => Light::Point(PointLight::new(*position, *intensity, centre)),
-        EmitterKind::Spot { to_world, intensity, cutoff_angle, beam_width } => {
-            Light::Spot(Box::new(SpotLight::new(*to_world, *intensity, *cutoff_angle, *beam_width, centre)?))
+        EmitterKind::Spot { to_world, intensity, cutoff_angle, beam_width, texture } => {
+            let mut light = SpotLight::new(*to_world, *intensity, *cutoff_angle, *beam_width, centre)?;
+            if let Some(texture) = texture {
+                let texture = Arc::new(Emission(textures.color(ColorDesc::Texture(*texture))));
+                light = light.with_projection(Projection::new(texture, *to_world, *cutoff_angle)?);
+            }
+            Light::Spot(Box::new(light))
         }
         EmitterKind::Directional { direction, irradiance } => {
             Light::Directional(DirectionalLight::new(*direction, *irradiance, radius)?)

@@ -12,7 +12,7 @@ use super::stats::Clock;
 use super::{Finished, JobError, Method, Plan, RenderRequest, Rendered, Runtime, SceneRequest};
 use crate::load::load_scene;
 use crate::prepared::{PrepareOptions, PreparedScene};
-use crate::scene::{Diagnostics, SceneDesc};
+use crate::scene::{Diagnostic, Diagnostics, SceneDesc};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -39,6 +39,8 @@ pub struct LoadedScene {
     pub desc: SceneDesc,
     /// Diagnostics that the observer has not heard yet.
     pub diagnostics: Diagnostics,
+    /// Why the picture is another than the file asks for.
+    changes: Vec<String>,
     /// Wall seconds of loading.
     seconds: f64,
 }
@@ -58,6 +60,8 @@ pub struct PreparedJob {
 pub(super) struct History {
     /// Pictures and patterns of the description.
     pub textures: usize,
+    /// Why the picture is another than the file asks for.
+    pub changes: Vec<String>,
     /// Wall seconds by phase.
     pub phases: BTreeMap<&'static str, f64>,
 }
@@ -71,7 +75,8 @@ pub fn load(request: &SceneRequest, runtime: Runtime) -> Result<LoadedScene, Job
     let (desc, diagnostics) = clock.time(|| runtime.pool.install(|| load_scene(&request.file, &request.options)))?;
     runtime.observer.diagnostics(&diagnostics);
     let (file, seconds) = (request.file.clone(), clock.total().as_secs_f64());
-    Ok(LoadedScene { file, desc, diagnostics: Diagnostics::default(), seconds })
+    let changes = diagnostics.changing_picture().list.iter().map(Diagnostic::line).collect();
+    Ok(LoadedScene { file, desc, diagnostics: Diagnostics::default(), changes, seconds })
 }
 
 /// Step 2: fills in what the request leaves open.
@@ -87,7 +92,7 @@ pub fn resolve(request: &RenderRequest, loaded: &mut LoadedScene) -> Result<Plan
 /// # Errors
 /// If the scene cannot be rendered, or not as the options ask.
 pub fn prepare(loaded: LoadedScene, options: &PrepareOptions, runtime: Runtime) -> Result<PreparedJob, JobError> {
-    let LoadedScene { file, desc, mut diagnostics, seconds } = loaded;
+    let LoadedScene { file, desc, mut diagnostics, changes, seconds } = loaded;
     let textures = desc.textures.len();
     let mut clock = Clock::default();
     let scene = clock.time(|| runtime.pool.install(|| PreparedScene::build(desc, options, &mut diagnostics)));
@@ -95,7 +100,7 @@ pub fn prepare(loaded: LoadedScene, options: &PrepareOptions, runtime: Runtime) 
     let scene = scene.map_err(JobError::input)?;
     let prepare = clock.total().as_secs_f64();
     let phases = BTreeMap::from([("load", seconds), ("prepare", prepare), ("tree", scene.tree_seconds)]);
-    Ok(PreparedJob { file, scene, history: History { textures, phases } })
+    Ok(PreparedJob { file, scene, history: History { textures, changes, phases } })
 }
 
 impl PreparedJob {

@@ -198,6 +198,7 @@ fn metadata(prepared: &PreparedJob, plan: &Plan, stats: &RenderStats) -> Metadat
     // A render with an error target has two halves with seeds of their own.
     let seeds = stats.error.map_or_else(|| vec![stats.seed], |e| e.seeds.to_vec());
     let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+    let changes = Some(stats.scene_changes.join("\n")).filter(|lines| !lines.is_empty());
     [
         ("software", format!("lightsieve {}", stats.version)),
         ("scene", prepared.file.display().to_string()),
@@ -211,6 +212,7 @@ fn metadata(prepared: &PreparedJob, plan: &Plan, stats: &RenderStats) -> Metadat
         ("unbiased", plan.method.spec.unbiased.to_string()),
     ]
     .into_iter()
+    .chain(changes.map(|lines| ("sceneChanges", lines)))
     .map(|(k, v)| (format!("lightsieve:{k}"), v))
     .collect()
 }

@@ -122,6 +122,9 @@ pub struct RenderStats {
     /// Decisions of the integrator, for people to read.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+    /// Why the picture is another than the scene file asks for: what was left out or replaced, by message and place.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub scene_changes: Vec<String>,
     /// Integrator.
     pub integrator: &'static str,
     /// Program version.
@@ -178,6 +181,7 @@ impl RenderStats {
             threads,
             backend: scene.query.describe(),
             notes: outcome.notes.clone(),
+            scene_changes: prepared.history.changes.clone(),
             integrator: plan.method.spec.name,
             version: env!("CARGO_PKG_VERSION"),
             scene: SceneStats::new(prepared),

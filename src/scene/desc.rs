@@ -190,6 +190,11 @@ pub enum TextureDesc {
         /// Multiplies every value.
         scale: f32,
     },
+    /// Colours of the mesh ([`MeshDesc::colors`]), interpolated.
+    MeshAttribute {
+        /// Multiplies every value.
+        scale: f32,
+    },
     /// Two colours in squares of side one half in texture space.
     Checkerboard {
         /// Squares (even, even).
@@ -371,6 +376,8 @@ pub enum EmitterKind {
         cutoff_angle: f32,
         /// Half angle in degrees up to which it has full strength; falls off linearly in angle from there.
         beam_width: f32,
+        /// Multiplies the intensity; projected on the square that just holds the cone.
+        texture: Option<TextureId>,
     },
     /// Parallel light from infinity.
     Directional {

@@ -82,6 +82,12 @@ impl Diagnostic {
         }
     }
 
+    /// An error about what is not supported and would change the picture. Whoever forces the scene to load gets a
+    /// warning instead.
+    pub fn unsupported(message: impl Into<String>) -> Diagnostic {
+        Diagnostic::error("scene::unsupported", message).changing_picture()
+    }
+
     /// A warning.
     pub fn warning(code: &'static str, message: impl Into<String>) -> Diagnostic {
         Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, message) }
@@ -90,6 +96,14 @@ impl Diagnostic {
     /// A note.
     pub fn note(code: &'static str, message: impl Into<String>) -> Diagnostic {
         Diagnostic { severity: Severity::Note, ..Diagnostic::error(code, message) }
+    }
+
+    /// The message and its place, on one line.
+    pub fn line(&self) -> String {
+        match &self.span {
+            Some(span) => format!("{}: {}", span.location(), self.message),
+            None => self.message.clone(),
+        }
     }
 
     /// Adds the place.
@@ -104,7 +118,7 @@ impl Diagnostic {
         self
     }
 
-    /// Marks a warning of a picture that is another than the file asks for.
+    /// Marks a message that tells of a picture other than the file asks for.
     pub fn changing_picture(mut self) -> Diagnostic {
         self.changes_picture = true;
         self

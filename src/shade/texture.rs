@@ -19,6 +19,8 @@ pub enum Texture {
     Bitmap(Bitmap),
     /// Two colours in squares.
     Checkerboard(Checkerboard),
+    /// Colours of the mesh times a number.
+    MeshAttribute(f32),
 }
 
 impl Texture {
@@ -27,6 +29,7 @@ impl Texture {
         match self {
             Texture::Bitmap(b) => b.color(point.uv),
             Texture::Checkerboard(c) => c.side(point.uv).eval(point),
+            Texture::MeshAttribute(scale) => point.color * *scale,
         }
     }
 
@@ -35,6 +38,7 @@ impl Texture {
         match self {
             Texture::Bitmap(b) => b.scalar(point.uv),
             Texture::Checkerboard(c) => c.side(point.uv).eval(point).luminance(),
+            Texture::MeshAttribute(scale) => (point.color * *scale).luminance(),
         }
     }
 
@@ -42,15 +46,17 @@ impl Texture {
     pub fn gradient(&self, point: &SurfacePoint) -> Vec2 {
         match self {
             Texture::Bitmap(b) => b.gradient(point.uv),
-            Texture::Checkerboard(_) => Vec2::ZERO,
+            Texture::Checkerboard(_) | Texture::MeshAttribute(_) => Vec2::ZERO,
         }
     }
 
-    /// Mean over the unit square of texture space (before `to_uv`).
+    /// Mean over the unit square of texture space (before `to_uv`); of mesh attributes, which are not known here, a
+    /// middle value.
     pub fn mean(&self) -> Rgb {
         match self {
             Texture::Bitmap(b) => b.mean,
             Texture::Checkerboard(c) => (c.even.mean() + c.odd.mean()) * 0.5,
+            Texture::MeshAttribute(scale) => Rgb::grey(0.5 * scale),
         }
     }
 }
@@ -345,6 +351,7 @@ impl TextureSet {
                 }
                 Texture::Bitmap(Bitmap::new(image.image.clone(), *to_uv, *filter, *wrap, *scale))
             }
+            TextureDesc::MeshAttribute { scale } => Texture::MeshAttribute(*scale),
             TextureDesc::Checkerboard { color0, color1, to_uv } => {
                 for c in [color0, color1] {
                     if let ColorDesc::Texture(id) = c {

@@ -106,6 +106,7 @@ fn all_lights() -> Vec<(&'static str, Light)> {
     let emission = TriangleEmission::Textured(Box::new(textured));
     let map = |w, h| Environment::Map(Box::new(EnvMap::new(&test_image(w, h), 1.5, tilted()).unwrap()));
     let spot = SpotLight::new(tilted(), Rgb::new(3.0, 2.0, 1.0), 35.0, 20.0, DVec3::new(0.3, 0.1, 0.0)).unwrap();
+    let projection = Projection::new(Arc::new(Ramp), tilted(), 35.0).unwrap();
     let directional = DirectionalLight::new(DVec3::new(1.0, -2.0, -3.0), Rgb::new(1.0, 0.5, 2.0), 2.0).unwrap();
     vec![
         ("triangle", Light::Triangle(triangle(corners, Rgb::new(2.0, 1.0, 0.5)))),
@@ -115,6 +116,7 @@ fn all_lights() -> Vec<(&'static str, Light)> {
         ("disk", round(RoundKind::Disk, true)),
         ("cylinder", round(RoundKind::Cylinder, true)),
         ("point", Light::Point(PointLight::new(DVec3::new(0.3, 0.2, 1.1), Rgb::new(1.0, 2.0, 3.0), DVec3::ZERO))),
+        ("spot with a texture", Light::Spot(Box::new(spot.clone().with_projection(projection)))),
         ("spot", Light::Spot(Box::new(spot))),
         ("directional", Light::Directional(directional)),
         ("constant", environment(Environment::Constant(Rgb::new(0.2, 0.4, 0.8)))),

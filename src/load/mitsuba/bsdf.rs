@@ -1,14 +1,14 @@
 //! Materials: scattering models by the table of [`MODELS`], operators on other materials by [`OPERATORS`].
 
 use super::conductors;
-use super::objects::Builder;
+use super::objects::{Builder, FORCE};
 use super::props::Props;
 use super::spectrum::Purpose::Reflectance;
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, nearest};
 use crate::scene::{
     BsdfDesc, BsdfId, BsdfKind, ColorDesc, ComplexIor, Distribution, MODELS, ParamSource, Roughness, ScalarDesc,
-    TextureId, WardVariant,
+    TextureDesc, TextureId, WardVariant,
 };
 
 /// Reads a plugin that combines or modifies other materials.
@@ -98,7 +98,8 @@ impl Builder<'_> {
     fn supported_plugin<'p>(&mut self, props: &Props<'p>) -> &'p str {
         let Some(replaced) = REPLACED.iter().find(|r| r.name == props.plugin) else { return props.plugin };
         let message = format!("`{}` is not supported: `{}` is used instead", replaced.name, replaced.replacement);
-        self.push(Diagnostic::warning("scene::replaced-plugin", message).at(props.element().span_of("type")));
+        let d = Diagnostic::warning("scene::replaced-plugin", message).at(props.element().span_of("type"));
+        self.push(d.changing_picture());
         props.ignore(replaced.ignored);
         replaced.replacement
     }
@@ -156,6 +157,10 @@ fn mask(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
 fn bump_map(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
     let scale = props.float_or("scale", 1.0) as f32;
     let (height, nested) = builder.texture_and_nested(props, ["map", "bumpmap"])?;
+    if matches!(builder.scene.textures[height.index()], TextureDesc::MeshAttribute { .. }) {
+        let message = "a `mesh_attribute` as the heights of a `bumpmap` is not supported";
+        builder.push(Diagnostic::unsupported(message).at(props.span()).help(FORCE));
+    }
     Some(BsdfKind::BumpMap { nested, height, scale })
 }
 
@@ -256,7 +261,7 @@ impl ParamSource for BsdfProps<'_, '_, '_, '_> {
                 "scene::replaced-distribution",
                 "this distribution of normals is not supported: ggx is used",
             );
-            self.builder.push(d.at(node.span_of("value")));
+            self.builder.push(d.at(node.span_of("value")).changing_picture());
             choices.extend([("phong", Distribution::Ggx), ("as", Distribution::Ggx)]);
         }
         let distribution = p.choice("distribution", &choices, Distribution::Beckmann);

@@ -1,6 +1,7 @@
 //! XML text into a tree: spans, includes, `<default>` and `-D` parameters, aliases, ids, renaming of old spellings.
 
 use super::limits::Usage;
+use super::objects::FORCE;
 use crate::image::{MAX_TEXT_BYTES, read_regular};
 use crate::load::paths::locate_or_warn;
 use crate::load::report::Report;
@@ -286,7 +287,7 @@ impl Loader<'_> {
             return true;
         }
         let d = if tag == SUBSURFACE {
-            Diagnostic::warning("scene::ignored-element", "subsurface scattering is not supported: ignored")
+            Diagnostic::unsupported("subsurface scattering is not supported").help(FORCE)
         } else {
             let d = Diagnostic::error("scene::unknown-element", format!("unknown element <{tag}>"));
             match nearest(tag, known) {

@@ -7,7 +7,7 @@ use super::sun;
 use super::texture::legacy_gamma;
 use crate::load::assets::ImageUse;
 use crate::scene::diag::Diagnostic;
-use crate::scene::{EmitterDesc, EmitterKind};
+use crate::scene::{ColorDesc, EmitterDesc, EmitterKind, TextureId};
 use glam::{DMat4, DVec3};
 
 const PLUGINS: [&str; 9] = ["area", "point", "spot", "directional", "constant", "envmap", "sunsky", "sun", "sky"];
@@ -21,8 +21,17 @@ impl Builder<'_> {
         }
         let Some(props) = self.props(node) else { return };
         let Some(kind) = self.emitter_kind(&props) else { return };
-        self.scene.emitters.push(EmitterDesc { kind, span: Some(props.span()) });
-        props.ignore(&["sampling_weight"]);
+        let is_delta =
+            matches!(kind, EmitterKind::Point { .. } | EmitterKind::Spot { .. } | EmitterKind::Directional { .. });
+        // How often a light is chosen is the integrators' own business. Mitsuba never chooses one of weight 0, and only
+        // lights that rays can meet shine all the same.
+        if is_delta && self.sampling_weight(&props) == 0.0 {
+            let message = "a light without extent and with a `sampling_weight` of 0 is dark, as in Mitsuba";
+            self.push(Diagnostic::warning("scene::dark-emitter", message).at(props.span()));
+        } else {
+            self.sampling_weight(&props);
+            self.scene.emitters.push(EmitterDesc { kind, span: Some(props.span()) });
+        }
         props.finish();
     }
 
@@ -40,18 +49,13 @@ impl Builder<'_> {
                 intensity: self.rgb(p, "intensity", 1.0, Emission),
             },
             "spot" => {
-                if let Some(node) = p.get("texture") {
-                    self.push(
-                        Diagnostic::warning("scene::ignored-property", "a spot light's `texture` is ignored")
-                            .at(node.span.clone()),
-                    );
-                }
                 let cutoff = p.positive_or("cutoff_angle", 20.0);
                 EmitterKind::Spot {
                     to_world: to_world(p),
                     intensity: self.rgb(p, "intensity", 1.0, Emission),
                     cutoff_angle: cutoff as f32,
                     beam_width: p.float_or("beam_width", cutoff * 0.75) as f32,
+                    texture: self.projected_texture(p, cutoff),
                 }
             }
             "directional" => {
@@ -76,6 +80,30 @@ impl Builder<'_> {
                 return None;
             }
         })
+    }
+
+    /// The texture that a spot light projects.
+    fn projected_texture(&mut self, p: &Props<'_>, cutoff: f64) -> Option<TextureId> {
+        let ColorDesc::Texture(texture) = self.optional_color(p, "texture", Reflectance)? else {
+            p.error("scene::wrong-type", "the `texture` of a spot light must be a <texture>");
+            return None;
+        };
+        if cutoff >= 90.0 {
+            p.error("scene::bad-value", "a spot light with a `texture` needs a `cutoff_angle` below 90 degrees");
+        }
+        self.require_pictures(ColorDesc::Texture(texture), &p.span());
+        Some(texture)
+    }
+
+    /// The sampling weight of an emitter, which must not be negative.
+    pub(super) fn sampling_weight(&self, p: &Props<'_>) -> f64 {
+        let weight = p.float_or("sampling_weight", 1.0);
+        if weight < 0.0
+            && let Some(node) = p.get("sampling_weight")
+        {
+            p.bad_value(node, "value", format!("a `sampling_weight` of {weight}"), "a number that is not negative");
+        }
+        weight
     }
 
     fn sun_sky(&mut self, p: &Props<'_>, to_world: DMat4) -> EmitterKind {

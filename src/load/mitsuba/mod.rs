@@ -13,6 +13,7 @@ mod emitter;
 mod indices;
 mod limits;
 mod objects;
+mod plugins;
 mod props;
 mod sensor;
 mod shape;
@@ -87,8 +88,9 @@ impl Builder<'_> {
                 "emitter" => self.emitter(child),
                 // Built when something refers to them; those that nobody uses are still checked below.
                 "bsdf" | "texture" | "film" | "sampler" | "rfilter" => {}
-                "medium" | "volume" => self.ignored_medium(child),
-                "ref" | "spectrum" => {}
+                // Where something refers to a medium, this is reported there.
+                "medium" | "volume" if !self.referenced.contains(&child) => self.ignored_medium(child),
+                "medium" | "volume" | "ref" | "spectrum" => {}
                 tag => {
                     let d = Diagnostic::error(
                         "scene::misplaced-element",

@@ -1,6 +1,7 @@
 //! The builder: what all plugin kinds share, above all references and what has been built already.
 
 use super::document::{Node, Tree};
+use super::plugins;
 use super::props::Props;
 use crate::load::assets::Assets;
 use crate::load::paths::locate_or_warn;
@@ -13,6 +14,9 @@ use std::path::PathBuf;
 
 /// A chain of objects within objects longer than this is a mistake, if it is not a circle.
 const MAX_CHAIN: usize = 64;
+
+/// The way out of what is not supported.
+pub(super) const FORCE: &str = "--force renders the scene without it";
 
 /// Builds a scene from a tree.
 pub(super) struct Builder<'t> {
@@ -56,6 +60,12 @@ impl<'t> Builder<'t> {
 
     pub(super) fn props(&self, node: usize) -> Option<Props<'t>> {
         Props::new(self.tree, node, self.report)
+    }
+
+    /// As [`Builder::resolve`], without a report.
+    pub(super) fn referred(&self, index: usize) -> Option<usize> {
+        let node = self.node(index);
+        if node.tag == "ref" { self.tree.ids.get(&node.attr("id")?.value).copied() } else { Some(index) }
     }
 
     /// The object that an element is or, if it is a `<ref>`, names.
@@ -102,9 +112,14 @@ impl<'t> Builder<'t> {
         out
     }
 
-    /// Reports a plugin that does not exist.
+    /// Reports a plugin that does not exist, or that is refused.
     pub(super) fn unknown_plugin(&self, props: &Props<'_>, known: &[&str]) {
         let kind = &props.element().tag;
+        if let Some(why) = plugins::refusal(kind, props.plugin) {
+            let d = Diagnostic::unsupported(format!("the {kind} plugin `{}` is not supported: {why}", props.plugin));
+            self.push(d.at(props.element().span_of("type")).help(FORCE));
+            return;
+        }
         let mut d = Diagnostic::error("scene::unknown-plugin", format!("unknown {kind} plugin `{}`", props.plugin))
             .at(props.element().span_of("type"))
             .help(format!("known {kind} plugins: {}", known.join(", ")));

@@ -1,6 +1,6 @@
 //! Cameras and films.
 
-use super::objects::Builder;
+use super::objects::{Builder, FORCE};
 use super::props::Props;
 use crate::scene::diag::Diagnostic;
 use crate::scene::{FilmDesc, FilterDesc, FovAxis, SensorDesc};
@@ -43,8 +43,9 @@ impl Builder<'_> {
                 "film" => film = self.film(object),
                 "sampler" => sample_count = self.sampler(object),
                 "medium" => self.push(
-                    Diagnostic::warning("scene::medium-ignored", "participating media are not supported: ignored")
-                        .at(self.node(object).span.clone()),
+                    Diagnostic::unsupported("participating media are not supported")
+                        .at(self.node(object).span.clone())
+                        .help(FORCE),
                 ),
                 tag => {
                     let d =
@@ -165,7 +166,7 @@ impl Builder<'_> {
                     "scene::replaced-plugin",
                     "the filter `lanczos` is not supported: `gaussian` is used instead",
                 );
-                self.push(d.at(p.element().span_of("type")));
+                self.push(d.at(p.element().span_of("type")).changing_picture());
                 FilterDesc::Gaussian { stddev: 0.5 }
             }
             _ => {

@@ -1,11 +1,11 @@
 //! Shapes, groups of shapes, and their instances.
 
 use super::document::OBJECT_TAGS;
-use super::objects::Builder;
+use super::objects::{Builder, FORCE};
 use super::props::Props;
 use super::spectrum::Purpose::Emission;
 use crate::load::assets::MeshSource;
-use crate::load::mesh::MeshOptions;
+use crate::load::mesh::{MeshColors, MeshOptions};
 use crate::load::primitives::Primitive;
 use crate::math::{Frame, Rgb};
 use crate::scene::diag::Diagnostic;
@@ -158,20 +158,17 @@ impl Builder<'_> {
         };
         options.mirrored = to_world.determinant() < 0.0;
 
-        let mut bsdf = p.get_index("bsdf").and_then(|b| self.bsdf(b));
+        let mut material = p.get_index("bsdf");
         let mut emission = None;
         p.ignore(&["silhouette_sampling_weight"]);
         for object in p.objects() {
             let Some(found) = self.resolve(object) else { continue };
             match self.node(found).tag.as_str() {
-                "bsdf" => bsdf = self.bsdf(object),
+                "bsdf" => material = Some(object),
                 "emitter" => emission = self.area_emission(found),
                 "medium" => {
-                    let d = Diagnostic::warning(
-                        "scene::medium-ignored",
-                        "participating media are not supported: this one is ignored",
-                    );
-                    self.push(d.at(self.node(object).span.clone()));
+                    let d = Diagnostic::unsupported("participating media are not supported");
+                    self.push(d.at(self.node(object).span.clone()).help(FORCE));
                 }
                 tag => {
                     let d =
@@ -181,6 +178,8 @@ impl Builder<'_> {
             }
         }
         p.finish();
+        let mut bsdf = material.and_then(|m| self.bsdf(m));
+        options.colors = material.map_or(MeshColors::Unused, |m| self.mesh_colors(m));
         // As in Mitsuba 3, a light without a material reflects nothing.
         if emission.is_some() && bsdf.is_none() {
             let kind = DiffuseParams { reflectance: ColorDesc::Constant(Rgb::BLACK) }.into();
@@ -189,7 +188,15 @@ impl Builder<'_> {
         }
         let source = source.for_placement(&to_world, emission.is_some());
         let geometry = match source {
-            Source::Round(kind) => ShapeGeometry::Round(kind),
+            Source::Round(kind) => {
+                if options.colors != MeshColors::Unused {
+                    let attribute = options.colors.attribute();
+                    let message =
+                        format!("a texture asks for `{attribute}`, which spheres, disks and cylinders do not have");
+                    self.push(Diagnostic::error("load::missing-attribute", message).at(span.clone()));
+                }
+                ShapeGeometry::Round(kind)
+            }
             Source::Mesh(mesh) => ShapeGeometry::Mesh(self.assets.mesh(mesh, options, span)),
         };
         let name = p.element().attr("id").map(|a| a.value.clone());
@@ -208,8 +215,8 @@ impl Builder<'_> {
             return None;
         }
         let radiance = self.color(&p, "radiance", 1.0, Emission);
-        self.require_pictures(radiance);
-        p.ignore(&["sampling_weight"]);
+        self.require_pictures(radiance, &p.span());
+        self.sampling_weight(&p);
         p.finish();
         Some(AreaEmission { radiance, span: Some(p.span()) })
     }

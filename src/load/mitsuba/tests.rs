@@ -95,7 +95,8 @@ const MISTAKES: &[(&str, &[&str])] = &[
     (r#"<sensor type="perspective"><float name="fov" value="¦180"/></sensor>"#, &["scene::bad-value"]),
     (r#"<sensor type="perspective"><film type="hdrfilm"><rfilter type="¦lanczos"/></film></sensor>"#, &["scene::replaced-plugin"]),
     (r#"¦<medium type="homogeneous"/>"#, &["scene::medium-ignored"]),
-    (r#"<shape type="cube">¦<medium type="homogeneous" name="interior"/></shape>"#, &["scene::medium-ignored"]),
+    (r#"<shape type="cube">¦<medium type="homogeneous" name="interior"/></shape>"#, &["scene::unsupported"]),
+    (r#"<shape type="cube"><bsdf type="¦coating"/></shape>"#, &["scene::unsupported"]),
     (r#"<shape type="instance">¦<ref id="g"/></shape><shape type="cube" id="g"/>"#, &["scene::wrong-type"]),
     (r#"<shape type="shapegroup"><shape type="cube">¦<emitter type="area"/></shape></shape>"#, &["scene::instanced-emitter"]),
     (r#"<bsdf type="diffuse"><spectrum name="reflectance" value="¦500:1, 400:1"/></bsdf>"#, &["scene::bad-value"]),
@@ -496,6 +497,7 @@ fn files_are_found_read_and_mistakes_in_them_placed() {
 mod hostile;
 mod legacy;
 mod pictures;
+mod plugins;
 mod references;
 
 const FUZZED: &str = "<scene version=\"2.1.0\"><default name=\"n\" value=\"4\"/><sensor type=\"perspective\"><float name=\"fov\" value=\"$n\"/><transform name=\"to_world\">\

@@ -4,8 +4,10 @@ use super::objects::Builder;
 use super::props::Props;
 use super::spectrum::Purpose::Reflectance;
 use crate::load::assets::ImageUse;
+use crate::load::mesh::MeshColors;
 use crate::scene::diag::Diagnostic;
-use crate::scene::{ColorDesc, TextureDesc, TextureFilter, TextureId, WrapMode};
+use crate::scene::{ColorDesc, Span, TextureDesc, TextureFilter, TextureId, WrapMode};
+use std::collections::HashSet;
 
 impl Builder<'_> {
     /// The texture `object`, reached from the element `from`.
@@ -56,23 +58,28 @@ impl Builder<'_> {
                 let color1 = self.color(p, "color1", 0.2, Reflectance);
                 Some(TextureDesc::Checkerboard { color0, color1, to_uv: to_uv(p) })
             }
+            "mesh_attribute" => Some(mesh_attribute(p)),
             // 0.6: a texture times a number.
             "scale" => self.scaled(p),
             _ => {
-                self.unknown_plugin(p, &["bitmap", "checkerboard", "scale"]);
+                self.unknown_plugin(p, &["bitmap", "checkerboard", "mesh_attribute", "scale"]);
                 None
             }
         }
     }
 
-    /// Makes it an error if a picture of a texture that lights the scene cannot be read.
-    pub(super) fn require_pictures(&mut self, color: ColorDesc) {
+    /// Makes it an error if a picture of a texture that lights the scene cannot be read. `at` is the light.
+    pub(super) fn require_pictures(&mut self, color: ColorDesc, at: &Span) {
         let ColorDesc::Texture(id) = color else { return };
         match self.scene.textures[id.index()] {
             TextureDesc::Bitmap { image, .. } => self.assets.require(image),
+            TextureDesc::MeshAttribute { .. } => {
+                let message = "a `mesh_attribute` that lights the scene is not supported";
+                self.push(Diagnostic::unsupported(message).at(at.clone()));
+            }
             // Nested textures are built before the one that holds them, so that there is no circle.
             TextureDesc::Checkerboard { color0, color1, .. } => {
-                [color0, color1].into_iter().for_each(|c| self.require_pictures(c));
+                [color0, color1].into_iter().for_each(|c| self.require_pictures(c, at));
             }
         }
     }
@@ -108,6 +115,28 @@ impl Builder<'_> {
         }
     }
 
+    /// The colours of its mesh that a shape's material (an element or a reference to one) looks up.
+    pub(super) fn mesh_colors(&self, material: usize) -> MeshColors {
+        let mut found = MeshColors::Unused;
+        let (mut open, mut seen) = (vec![material], HashSet::new());
+        while let Some(index) = open.pop() {
+            let Some(object) = self.referred(index).filter(|&object| seen.insert(object)) else { continue };
+            let node = self.node(object);
+            open.extend(&node.children);
+            let is_attribute = node.attr("type").is_some_and(|a| a.value == "mesh_attribute");
+            let name = |c: &usize| self.node(*c).attr("name").is_some_and(|a| a.value == "name");
+            let Some(name) = node.children.iter().find(|c| is_attribute && name(c)) else { continue };
+            let value = self.node(*name).attr("value").map_or("", |a| a.value.as_str());
+            let colors = if value == MeshColors::Face.attribute() { MeshColors::Face } else { MeshColors::Vertex };
+            if found != MeshColors::Unused && found != colors {
+                let message = "`vertex_color` and `face_color` of one shape together are not supported";
+                self.push(Diagnostic::unsupported(message).at(node.span.clone()));
+            }
+            found = colors;
+        }
+        found
+    }
+
     fn scaled(&mut self, p: &Props<'_>) -> Option<TextureDesc> {
         let factor = p.float_or("scale", 1.0) as f32;
         let &[nested] = p.objects().as_slice() else {
@@ -118,7 +147,7 @@ impl Builder<'_> {
         let id = self.texture(nested, object)?;
         let mut desc = self.scene.textures[id.index()].clone();
         match &mut desc {
-            TextureDesc::Bitmap { scale, .. } => *scale *= factor,
+            TextureDesc::Bitmap { scale, .. } | TextureDesc::MeshAttribute { scale } => *scale *= factor,
             TextureDesc::Checkerboard { color0, color1, .. } => {
                 for color in [color0, color1] {
                     match color {
@@ -172,4 +201,15 @@ fn to_uv(p: &Props<'_>) -> [[f32; 3]; 2] {
         }
     }
     [u, v].map(|row| row.map(|x| x as f32))
+}
+
+/// A texture of colours of the mesh that it is on.
+fn mesh_attribute(p: &Props<'_>) -> TextureDesc {
+    let scale = p.float_or("scale", 1.0) as f32;
+    let known = [MeshColors::Vertex, MeshColors::Face].map(|c| (c.attribute(), c));
+    if !p.has("name") {
+        p.error("scene::missing-property", "a `mesh_attribute` needs the `name` of an attribute");
+    }
+    p.choice("name", &known, MeshColors::Vertex);
+    TextureDesc::MeshAttribute { scale }
 }

@@ -8,6 +8,9 @@ use crate::scene::diag::{Diagnostic, nearest};
 use glam::{DMat4, DVec3, DVec4};
 use std::cell::RefCell;
 
+/// How far from one the length of a rotation's axis may be.
+const AXIS_TOLERANCE: f64 = 1e-3;
+
 const STEPS: [&str; 5] = ["translate", "rotate", "scale", "lookat", "matrix"];
 
 /// The matrix of a `<transform>` element; steps with mistakes are reported and left out.
@@ -15,6 +18,7 @@ pub(super) fn transform(tree: &Tree, node: usize, report: &RefCell<Report>) -> D
     let mut all = DMat4::IDENTITY;
     for &child in &tree.nodes[node].children {
         let step = &tree.nodes[child];
+        warn_of_axis(step, report);
         match matrix_of(step) {
             Ok(m) => all = m * all,
             Err((attr, message)) => {
@@ -27,6 +31,19 @@ pub(super) fn transform(tree: &Tree, node: usize, report: &RefCell<Report>) -> D
         }
     }
     all
+}
+
+/// Says where Mitsuba 3 makes something other than a rotation: it does not normalize the axis, as 0.6 did.
+fn warn_of_axis(step: &Node, report: &RefCell<Report>) {
+    if step.tag != "rotate" || step.legacy {
+        return;
+    }
+    let Ok(length) = vector(step, 0.0).map(DVec3::length) else { return };
+    if length > 0.0 && (length - 1.0).abs() > AXIS_TOLERANCE {
+        let message = format!("the axis of this rotation is {length:.3} long: it is taken as a direction");
+        let help = "Mitsuba 3 makes a matrix of it that is no rotation: normalize the axis for equal pictures";
+        report.borrow_mut().push(Diagnostic::warning("scene::rotation-axis", message).at(step.span.clone()).help(help));
+    }
 }
 
 /// The attribute at fault ("" for the element) and what is wrong.

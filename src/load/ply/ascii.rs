@@ -1,7 +1,7 @@
 //! The body of an ASCII PLY file: one row a line.
 
 use super::binary::Stream;
-use super::build::{Builder, VertexLayout, index_property};
+use super::build::{Builder, Face, FaceLayout, VertexLayout};
 use super::header::{Element, Header, Kind};
 use crate::load::mesh::{MeshError, Place};
 use std::io::Read;
@@ -38,21 +38,24 @@ pub(super) fn read_body<R: Read + Send>(
                 }
             }
             "face" => {
-                let list = index_property(element)?;
+                let layout = FaceLayout::of(element, builder)?;
                 builder.mesh.triangles.reserve_exact(element.count as usize);
-                let mut corners = Vec::new();
-                for face in 0..element.count {
+                let mut face = Face::default();
+                for number in 0..element.count {
                     each_number(element, stream, &mut line, |property, _, value| {
-                        if property == list {
+                        if let Some(component) = layout.component(property) {
+                            face.color[component] = value;
+                        }
+                        if property == layout.list {
                             if value.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&value) {
                                 return Err(format!("`{value}` is not the index of a vertex"));
                             }
-                            corners.push(value as u32);
+                            face.corners.push(value as u32);
                         }
                         Ok(())
                     })?;
-                    builder.face(face, &corners)?;
-                    corners.clear();
+                    builder.face_row(number, &face, &layout)?;
+                    face.corners.clear();
                 }
             }
             _ => {

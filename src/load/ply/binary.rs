@@ -3,7 +3,7 @@
 //! Layouts that nearly all files have (float vertices, faces as one list of `uchar` length with 32-bit indices, little
 //! endian) run through loops without any decision per value; everything else through a table.
 
-use super::build::{Builder, VertexLayout, index_property};
+use super::build::{Builder, Face, FaceLayout, VertexLayout};
 use super::header::{Element, Header, Kind, Scalar};
 use crate::load::mesh::{MeshError, Place};
 use glam::{Vec2, Vec3};
@@ -281,12 +281,12 @@ fn read_faces<O: Order, R: Read + Send>(
     stream: &mut Stream<R>,
     builder: &mut Builder,
 ) -> Result<(), MeshError> {
-    let list = index_property(element)?;
+    let layout = FaceLayout::of(element, builder)?;
     // No more than the file has room for: the header was checked.
     builder.mesh.triangles.reserve_exact(element.count as usize);
     let usual = element.properties.len() == 1
         && matches!(element.properties[0].kind, Kind::List { count: Scalar::U8, item: Scalar::I32 | Scalar::U32 });
-    let mut corners: Vec<u32> = Vec::new();
+    let mut row = Face::default();
     let mut face = 0u64;
     if usual {
         while face < element.count {
@@ -316,9 +316,9 @@ fn read_faces<O: Order, R: Read + Send>(
             }
             let count = usize::from(stream.available()[0]);
             stream.need(1 + 4 * count, "face")?;
-            corners.clear();
-            corners.extend((0..count).map(|i| O::u32(bytes(stream.available(), 1 + 4 * i))));
-            builder.face(face, &corners)?;
+            row.corners.clear();
+            row.corners.extend((0..count).map(|i| O::u32(bytes(stream.available(), 1 + 4 * i))));
+            builder.face(face, &row.corners)?;
             stream.begin += 1 + 4 * count;
             face += 1;
         }
@@ -326,14 +326,20 @@ fn read_faces<O: Order, R: Read + Send>(
     }
     let last = element.properties.len() - 1;
     each_row::<O, R>(element, stream, |property, values| {
-        if property == list
-            && let Row::List(item, data) = values
-        {
-            corners.clear();
-            corners.extend(data.chunks_exact(item.size()).map(|v| index::<O>(item, v, 0)));
+        match values {
+            Row::List(item, data) if property == layout.list => {
+                row.corners.clear();
+                row.corners.extend(data.chunks_exact(item.size()).map(|v| index::<O>(item, v, 0)));
+            }
+            Row::One(value) => {
+                if let Some(component) = layout.component(property) {
+                    row.color[component] = value;
+                }
+            }
+            Row::List(..) => {}
         }
         if property == last {
-            builder.face(face, &corners)?;
+            builder.face_row(face, &row, &layout)?;
             face += 1;
         }
         Ok(())

@@ -1,8 +1,9 @@
 //! Puts rows of a PLY file, however written, into the arrays of a mesh.
 
+use super::Parsed;
 use super::header::{Element, Kind, Scalar};
 use crate::image::buffer::srgb_to_linear;
-use crate::load::mesh::{Dropped, LoadedMesh, MeshError, Place};
+use crate::load::mesh::{Dropped, LoadedMesh, MeshColors, MeshError, MeshOptions, Place};
 use crate::load::polygon::{self, MAX_CONCAVE_CORNERS};
 use crate::math::Rgb;
 use crate::scene::MeshDesc;
@@ -19,6 +20,52 @@ pub(super) struct VertexLayout {
     pub color_is_srgb: bool,
 }
 
+/// Where in a row the three components of a colour are, and whether they are bytes.
+fn color_property(element: &Element) -> Option<([usize; 3], bool)> {
+    let find = |name: &str| element.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::One(_)));
+    let three = |names: [&str; 3]| Some([find(names[0])?, find(names[1])?, find(names[2])?]);
+    let color = three(["r", "g", "b"]).or_else(|| three(["red", "green", "blue"]))?;
+    Some((color, element.properties[color[0]].kind == Kind::One(Scalar::U8)))
+}
+
+/// A colour of a file as linear Rec. 709.
+fn color_of(row: [f64; 3], is_srgb: bool) -> Rgb {
+    Rgb::from(row.map(|v| if is_srgb { srgb_to_linear(v / 255.0) as f32 } else { v as f32 }))
+}
+
+/// Where in a row the known face properties are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FaceLayout {
+    /// The list of vertices.
+    pub list: usize,
+    /// The colour, if it is wanted.
+    color: Option<[usize; 3]>,
+    color_is_srgb: bool,
+}
+
+impl FaceLayout {
+    /// Finds the known properties of the face element.
+    pub(super) fn of(element: &Element, builder: &Builder) -> Result<FaceLayout, MeshError> {
+        let color = color_property(element).filter(|_| builder.face_colors_wanted);
+        let (color, color_is_srgb) = color.map_or((None, false), |(color, srgb)| (Some(color), srgb));
+        Ok(FaceLayout { list: index_property(element)?, color, color_is_srgb })
+    }
+
+    /// The component of the colour that a property is.
+    pub(super) fn component(&self, property: usize) -> Option<usize> {
+        self.color?.iter().position(|&p| p == property)
+    }
+}
+
+/// A row of the face element.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Face {
+    /// Indices of vertices.
+    pub corners: Vec<u32>,
+    /// The colour as the file has it.
+    pub color: [f64; 3],
+}
+
 impl VertexLayout {
     /// Finds the known properties of the vertex element.
     pub(super) fn of(element: &Element, normals_unwanted: bool) -> Result<VertexLayout, MeshError> {
@@ -28,7 +75,7 @@ impl VertexLayout {
         let two = |names: [&str; 2]| Some([find(names[0])?, find(names[1])?]);
         let position = three(["x", "y", "z"])
             .ok_or_else(|| MeshError::new(Place::File, "the `vertex` element lacks one of the properties x, y, z"))?;
-        let color = three(["r", "g", "b"]).or_else(|| three(["red", "green", "blue"]));
+        let (color, color_is_srgb) = color_property(element).map_or((None, false), |(color, srgb)| (Some(color), srgb));
         Ok(VertexLayout {
             position,
             normal: if normals_unwanted { None } else { three(["nx", "ny", "nz"]) },
@@ -36,13 +83,13 @@ impl VertexLayout {
                 .into_iter()
                 .find_map(two),
             color,
-            color_is_srgb: color.is_some_and(|c| element.properties[c[0]].kind == Kind::One(Scalar::U8)),
+            color_is_srgb,
         })
     }
 }
 
 /// The index of the face element's list of vertices.
-pub(super) fn index_property(element: &Element) -> Result<usize, MeshError> {
+fn index_property(element: &Element) -> Result<usize, MeshError> {
     let found = element.properties.iter().position(|p| {
         (p.name == "vertex_indices" || p.name == "vertex_index")
             && matches!(p.kind, Kind::List { item, .. } if item.is_integer())
@@ -67,6 +114,9 @@ struct Polygon {
 pub(super) struct Builder {
     pub mesh: MeshDesc,
     pub normals_unwanted: bool,
+    face_colors_wanted: bool,
+    /// One for each triangle, or none.
+    face_colors: Vec<Rgb>,
     skipped_faces: u64,
     polygons: Vec<Polygon>,
     /// Largest index seen, and the face that had it.
@@ -74,8 +124,12 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    pub(super) fn new(normals_unwanted: bool) -> Builder {
-        Builder { normals_unwanted, ..Builder::default() }
+    pub(super) fn new(options: MeshOptions) -> Builder {
+        Builder {
+            normals_unwanted: options.face_normals,
+            face_colors_wanted: options.colors == MeshColors::Face,
+            ..Builder::default()
+        }
     }
 
     /// Prepares for `count` vertices; the caller has made sure that the file is long enough for them.
@@ -108,8 +162,7 @@ impl Builder {
             self.mesh.uvs.push(Vec2::new(row[i[0]] as f32, row[i[1]] as f32));
         }
         if let Some(i) = layout.color {
-            let value = |v: f64| if layout.color_is_srgb { srgb_to_linear(v / 255.0) as f32 } else { v as f32 };
-            self.mesh.colors.push(Rgb::new(value(row[i[0]]), value(row[i[1]]), value(row[i[2]])));
+            self.mesh.colors.push(color_of(i.map(|i| row[i]), layout.color_is_srgb));
         }
     }
 
@@ -118,6 +171,16 @@ impl Builder {
         let bad = |from: usize, all: &[Vec3]| all.get(from..)?.iter().position(|v| !v.is_finite()).map(|i| i + from);
         let uv = self.mesh.uvs.get(first..).and_then(|v| v.iter().position(|v| !v.is_finite())).map(|i| i + first);
         bad(first, &self.mesh.positions).or(uv)
+    }
+
+    /// Adds face number `number`.
+    pub(super) fn face_row(&mut self, number: u64, face: &Face, layout: &FaceLayout) -> Result<(), MeshError> {
+        self.face(number, &face.corners)?;
+        if layout.color.is_some() {
+            let color = color_of(face.color, layout.color_is_srgb);
+            self.face_colors.resize(self.mesh.triangles.len(), color);
+        }
+        Ok(())
     }
 
     /// Adds face number `face`.
@@ -165,7 +228,7 @@ impl Builder {
     }
 
     /// The mesh, its indices checked.
-    pub(super) fn finish(mut self) -> Result<LoadedMesh, MeshError> {
+    pub(super) fn finish(mut self) -> Result<Parsed, MeshError> {
         let vertices = self.mesh.positions.len();
         if let Some((index, face)) = self.largest
             && index as usize >= vertices
@@ -182,6 +245,6 @@ impl Builder {
         // Polygons grow the list by doubling: give back what is too much.
         self.mesh.triangles.shrink_to_fit();
         let dropped = Dropped { faces: self.skipped_faces, statements: None };
-        Ok(LoadedMesh { mesh: self.mesh, dropped })
+        Ok(Parsed { loaded: LoadedMesh { mesh: self.mesh, dropped }, face_colors: self.face_colors })
     }
 }

@@ -6,7 +6,7 @@
 //! before a mesh can be made of them, and do not say at which byte a binary file is wrong; so neither is used.
 //!
 //! Known vertex properties: `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`, `texture_s texture_t`), `r g
-//! b` (or `red green blue`; eight-bit colours are taken as sRGB). Faces: `vertex_indices` or `vertex_index`; polygons
+//! b` (or `red green blue`; eight-bit colours are taken as sRGB; faces may have them too). Faces: `vertex_indices` or `vertex_index`; polygons
 //! are cut into triangles.
 
 mod ascii;
@@ -14,8 +14,9 @@ mod binary;
 mod build;
 mod header;
 
-use super::mesh::{self, LoadedMesh, MeshError, MeshOptions, Place};
+use super::mesh::{self, LoadedMesh, MeshColors, MeshError, MeshOptions, Place};
 use crate::image::open_regular;
+use crate::math::Rgb;
 use build::Builder;
 use header::{Format, Header};
 use std::io::Read;
@@ -24,17 +25,31 @@ use std::path::Path;
 /// Reads a PLY file.
 pub(super) fn read_ply(path: &Path, options: MeshOptions) -> Result<LoadedMesh, MeshError> {
     let (file, size) = open_regular(path)?;
-    let mut loaded = parse_ply(file, size, options.face_normals)?;
+    let Parsed { mut loaded, face_colors } = parse_ply(file, size, options)?;
+    if options.colors == MeshColors::Face {
+        loaded.mesh.colors = Vec::new();
+    }
     mesh::finish(&mut loaded.mesh, options);
+    if !face_colors.is_empty() {
+        mesh::color_faces(&mut loaded.mesh, &face_colors);
+    }
     loaded.mesh.name = path.display().to_string();
     Ok(loaded)
 }
 
-/// Parses a PLY stream of `size` bytes; without `normals_unwanted` the file's vertex normals are kept as they are.
-fn parse_ply(reader: impl Read + Send, size: u64, normals_unwanted: bool) -> Result<LoadedMesh, MeshError> {
+/// The contents of a file.
+#[derive(Debug)]
+struct Parsed {
+    loaded: LoadedMesh,
+    /// One for each triangle, if the options ask for colours of faces and the file has them.
+    face_colors: Vec<Rgb>,
+}
+
+/// Parses a PLY stream of `size` bytes. Normals of vertices are kept as they are, if the options want them.
+fn parse_ply(reader: impl Read + Send, size: u64, options: MeshOptions) -> Result<Parsed, MeshError> {
     let mut stream = binary::Stream::new(reader, size);
     let header = Header::read(&mut stream)?;
-    let mut builder = Builder::new(normals_unwanted);
+    let mut builder = Builder::new(options);
     match header.format {
         Format::Ascii => ascii::read_body(&header, &mut stream, &mut builder)?,
         Format::BinaryLittle => binary::read_body::<binary::Little, _>(&header, &mut stream, &mut builder)?,

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
 fn parse(bytes: &[u8]) -> Result<LoadedMesh, MeshError> {
-    parse_ply(bytes, bytes.len() as u64, false)
+    parse_ply(bytes, bytes.len() as u64, MeshOptions::default()).map(|parsed| parsed.loaded)
 }
 
 fn message(bytes: &[u8]) -> String {

@@ -20,6 +20,9 @@ RENDERS = {
     "references": [""],
     "spectrum": [""],
     "serialized": ["", "index=1"],
+    "spot-texture": [""],
+    "mesh-attribute": ["", "name=face_color"],
+    "bmp": [""],
 }
 
 
@@ -28,6 +31,9 @@ def pictures():
     Image.fromarray(np.full((8, 8), 128, np.uint8)).save("grey.png")
     Image.fromarray((20 + 30 * x).astype(np.uint8)).save("ramp.png")
     Image.fromarray(np.full((8, 8, 3), (170, 140, 230), np.uint8)).save("normal.png")
+    slide = np.stack([30 * x, 30 * y, 20 + 15 * (x + y)], -1).astype(np.uint8)
+    Image.fromarray(slide).save("slide.png")
+    Image.fromarray(slide).save("slide.bmp")
 
 
 def main():

@@ -45,3 +45,97 @@ fn a_slip_in_an_object_that_several_share_is_said_once() {
     // Also where nobody refers to it.
     assert_eq!(messages(load(&scene(film))), [("scene::unknown-property", 2, 44)]);
 }
+
+const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+    property float r\nproperty float g\nproperty float b\nelement face 1\nproperty list uchar int vertex_indices\n\
+    property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n\
+    0 0 0 0.1 0.2 0.3\n1 0 0 0.4 0.5 0.6\n1 1 0 0.7 0.8 0.9\n0 1 0 1 1 1\n4 0 1 2 3 255 0 255\n";
+
+fn attribute(name: &str) -> String {
+    format!("<texture name=\"reflectance\" type=\"mesh_attribute\"><string name=\"name\" value=\"{name}\"/></texture>")
+}
+
+/// A PLY file with a material that looks up an attribute of the mesh, given in the shape or by reference.
+fn with_attribute(name: &str, ply: &str) -> Result<(SceneDesc, Diagnostics), LoadFailure> {
+    let shape = format!(
+        "<bsdf type=\"twosided\" id=\"m\"><bsdf type=\"diffuse\">{}</bsdf></bsdf><shape type=\"ply\">\
+         <string name=\"filename\" value=\"a.ply\"/><ref id=\"m\"/></shape>",
+        attribute(name)
+    );
+    Files::new(&[("s.xml", &scene(&shape)), ("a.ply", ply)]).load(&LoadOptions::default())
+}
+
+#[test]
+fn attributes_of_vertices_and_faces_are_the_colors_of_the_mesh() {
+    let (s, _) = with_attribute("vertex_color", PLY).unwrap();
+    let mesh = &s.meshes[1];
+    assert_eq!((mesh.positions.len(), mesh.colors[2]), (4, Rgb::new(0.7, 0.8, 0.9)));
+    let (s, _) = with_attribute("face_color", PLY).unwrap();
+    let mesh = &s.meshes[1];
+    assert_eq!(mesh.colors, [Rgb::new(1.0, 0.0, 1.0); 6]);
+    assert_eq!((mesh.positions.len(), mesh.normals.len(), mesh.triangles.len()), (6, 6, 2));
+    assert_eq!(mesh.triangles[1].map(|i| mesh.positions[i as usize].y), [0.0, 1.0, 1.0]);
+    assert!(matches!(s.textures[0], TextureDesc::MeshAttribute { scale: 1.0 }));
+}
+
+#[test]
+fn attributes_that_cannot_be_had_are_errors() {
+    let code = |result: Result<(SceneDesc, Diagnostics), LoadFailure>| messages(result)[0].0;
+    let plain = PLY.replace(
+        "property float r\nproperty float g\nproperty float b\n",
+        "property float p\nproperty float q\nproperty float s\n",
+    );
+    assert_eq!(code(with_attribute("vertex_color", &plain)), "load::missing-attribute");
+    assert_eq!(
+        code(with_attribute("face_color", &PLY.replace("uchar green", "uchar grun"))),
+        "load::missing-attribute"
+    );
+    assert_eq!(code(with_attribute("vertex_velocity", PLY)), "scene::bad-value");
+    // A sphere has none, a light and a bump map cannot look any up.
+    for inside in [
+        format!("<shape type=\"sphere\"><bsdf type=\"diffuse\">{}</bsdf></shape>", attribute("face_color")),
+        format!(
+            "<shape type=\"disk\"><emitter type=\"area\">{}</emitter></shape>",
+            attribute("vertex_color").replace("reflectance", "radiance")
+        ),
+        format!(
+            "<bsdf type=\"bumpmap\">{}<bsdf type=\"diffuse\"/></bsdf>",
+            attribute("vertex_color").replace("reflectance", "map")
+        ),
+    ] {
+        let e = load(&scene(&inside)).unwrap_err();
+        assert!(
+            ["load::missing-attribute", "scene::unsupported"].contains(&e.diagnostics.list[0].code),
+            "{inside}: {e}"
+        );
+    }
+}
+
+#[test]
+fn sampling_weights_do_not_change_the_picture_except_that_none_is_dark() {
+    let point = |w: &str| format!("<emitter type=\"point\"><float name=\"sampling_weight\" value=\"{w}\"/></emitter>");
+    assert_eq!(good(&point("0.5")).emitters.len(), 2);
+    let (s, found) = load(&scene(&point("0"))).unwrap();
+    assert_eq!((s.emitters.len(), found.list[0].code), (1, "scene::dark-emitter"));
+    assert_eq!(messages(load(&scene(&point("-1"))))[0].0, "scene::bad-value");
+    let area = point("0").replace("point", "area");
+    let s = good(&format!("<shape type=\"disk\">{area}</shape>"));
+    assert!(s.shapes[1].emission.is_some());
+}
+
+#[test]
+fn axes_of_rotations_that_are_no_unit_vectors_are_said() {
+    let rotated = |version: &str, axis: &str| {
+        let inside = format!(
+            "<shape type=\"cube\"><transform name=\"to_world\"><rotate {axis} angle=\"60\"/></transform></shape>"
+        );
+        let (s, found) = load(&scene(&inside).replacen("3.0.0", version, 1)).unwrap();
+        (s.shapes[1].to_world, found.list.iter().map(|d| d.code).collect::<Vec<_>>())
+    };
+    let (unit, said) = rotated("3.0.0", "y=\"0.70710678\" z=\"0.70710678\"");
+    assert!(said.is_empty());
+    let (long, said) = rotated("3.0.0", "y=\"1\" z=\"1\"");
+    assert!(said == ["scene::rotation-axis"] && (0..4).all(|i| (unit.col(i) - long.col(i)).length() < 1e-7));
+    // Mitsuba 0.6 normalizes.
+    assert!(rotated("0.6.0", "y=\"1\" z=\"1\"").1.is_empty());
+}
