@@ -8,7 +8,7 @@ pub(crate) fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
-    // Of the rounded number, so that 9.99999 is 10.000.
+    // The exponent is that of the rounded number, so that 9.99999 is 10.000.
     let scientific = format!("{value:.*e}", (DIGITS - 1) as usize);
     let exponent = scientific.split_once('e').and_then(|(_, e)| e.parse::<i32>().ok()).unwrap_or(0);
     if (-4..DIGITS).contains(&exponent) { format!("{value:.*}", (DIGITS - 1 - exponent) as usize) } else { scientific }

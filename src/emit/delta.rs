@@ -197,7 +197,7 @@ impl SpotLight {
         })
     }
 
-    /// The same light with a projected texture, which multiplies the intensity.
+    /// This light with a projected texture, which multiplies the intensity.
     pub fn with_projection(self, projection: Projection) -> SpotLight {
         let mut light = SpotLight { projection: Some(projection), ..self.clone() };
         let directions = (0..POWER_GRID * POWER_GRID).map(|i| {

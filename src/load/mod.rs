@@ -31,7 +31,7 @@ pub struct LoadOptions {
     pub definitions: Vec<(String, String)>,
     /// A missing or unreadable picture is an error instead of a magenta stand-in with a warning.
     pub strict: bool,
-    /// What is not supported and would change the picture is a warning instead of an error.
+    /// Unsupported elements that would change the picture are warnings instead of errors.
     pub force: bool,
     /// Camera for files that have none (OBJ, PLY).
     pub camera: CameraOptions,

@@ -12,7 +12,7 @@ pub(super) const MAX_ERRORS: usize = 20;
 /// Diagnostics of one load.
 #[derive(Debug, Default)]
 pub(super) struct Report {
-    /// What is not supported is a warning instead of an error.
+    /// Unsupported elements are warnings instead of errors.
     force: bool,
     diagnostics: Diagnostics,
     errors: usize,

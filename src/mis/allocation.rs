@@ -144,7 +144,7 @@ pub struct RegionVariance {
     pub mean2: f64,
 }
 
-/// What the variance of each region is divided by: the square of its mean, and a share of the mean over all regions.
+/// Divisors of the regions' variances: the square of the region's mean, and a share of the mean over all regions.
 fn scales(variances: &[RegionVariance]) -> impl Iterator<Item = f64> {
     let overall = variances.iter().map(|v| v.mean2).sum::<f64>() / variances.len().max(1) as f64;
     variances.iter().map(move |v| v.mean2 + 0.01 * overall)
@@ -157,7 +157,7 @@ pub struct ProbedErrors {
     pub variance: f64,
     /// As much at [`SampleAllocation::EYE_ONLY`], if that is one of the candidates.
     pub eye_only: Option<f64>,
-    /// What the variance of each region is divided by, in squared radiance.
+    /// The divisor of each region's variance, in squared radiance.
     pub scales: Vec<f64>,
 }
 

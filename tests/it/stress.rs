@@ -24,7 +24,7 @@ struct Box {
     /// Place of the camera on the axis, with a box of half side 1.
     camera: f64,
     size: [u32; 2],
-    /// What else is in the box.
+    /// Other contents of the box.
     more: String,
 }
 

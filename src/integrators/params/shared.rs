@@ -124,6 +124,7 @@ pub const PATH_FALLBACK: ParamSpec = ParamSpec {
     short: "Leaves the render to path tracing where that is more efficient",
     long: "With allocation=auto and all techniques, the first two iterations and a few samples of the path tracer tell \
         which of them has the smaller product of cost and error, of pixels and of 16x16 blocks alike. Scenes in which \
-        next event finds all light are then rendered as `path` renders them. Light that only the method can find \
-        keeps it at work. The choice is written into the statistics. The expected picture is the same.",
+        next event finds all light are then rendered as `path` renders them. Scenes with light that path tracing \
+        cannot find are never left to it. The choice is written into the statistics. The expected picture is the \
+        same.",
 };

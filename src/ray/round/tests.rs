@@ -50,7 +50,7 @@ fn points_of_hits_are_on_the_surface_and_on_the_ray() {
                 RoundKind::Disk => x.z,
                 RoundKind::Cylinder => x.truncate().length() - 1.0,
             };
-            // Of ellipsoids the height is in another unit: the smallest axis has the largest.
+            // For ellipsoids the height is in another unit: the smallest axis has the largest.
             let unit = scale.abs().min_element();
             assert!(height.abs() * unit <= f64::from(error) * size / unit, "{kind:?} {scale} {height} {error}");
             assert!((ng.length() - 1.0).abs() < 1e-5);

@@ -10,7 +10,7 @@ struct Row {
     support: &'static str,
     version: &'static str,
     note: &'static str,
-    /// What stands inside of the plugin: of a plugin's own row what it always needs, else the parameter.
+    /// Elements inside of the plugin: in a plugin's own row those that it always needs, else the parameter.
     example: &'static str,
 }
 
@@ -60,7 +60,7 @@ fn is_unsupported(d: &Diagnostic) -> bool {
     d.code == "scene::unsupported" && d.changes_picture
 }
 
-/// What is wrong with a row, if anything.
+/// The fault of a row, if it has one.
 fn fault(row: &Row, xml: &str, files: &Files) -> Option<String> {
     std::fs::write(files.0.path().join("s.xml"), xml).unwrap();
     let loaded = files.load(&LoadOptions::default());

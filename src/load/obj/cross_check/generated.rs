@@ -87,7 +87,7 @@ fn text(statements: &[Statement], has: Attributes, ending: &str) -> String {
             Statement::Face(picks) => {
                 out.push('f');
                 for (i, mut pick) in picks.iter().copied().enumerate() {
-                    // Of polygons that are not convex the two readers make different triangles; one that goes to and
+                    // For polygons that are not convex the two readers make different triangles; one that goes to and
                     // fro between two places has no area and becomes a fan here as well.
                     if picks.len() > 3 {
                         pick.position = picks[i % 2].position;
