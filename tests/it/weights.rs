@@ -194,7 +194,8 @@ fn weights_of_all_techniques_sum_to_one() {
     let mut checked = 0;
     for name in GALLERY {
         let scene = prepare(exhibit(name), Backend::default_available(), None);
-        let paths: Vec<FullPath> = found(&bdpt::SPEC, &scene, &[], 8).into_iter().filter_map(|c| c.path).collect();
+        let paths: Vec<FullPath> =
+            found(&bdpt::SPEC, &scene, &[("path_fallback", "false")], 8).into_iter().filter_map(|c| c.path).collect();
         for path in &paths {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
                 let mis = context(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], [5, 2][i / 2 % 2]);
@@ -242,7 +243,12 @@ fn weights_do_not_depend_on_the_unit_of_length() {
             + &wall(gloss, "", r#"<rotate x="1" angle="-90"/><translate y="-1"/>"#.into())
             + &wall(grey, lamp, r#"<rotate x="1" angle="90"/><scale value="0.4"/><translate y="1"/>"#.into())
             + &wall(grey, "", r#"<rotate y="1" angle="90"/><translate x="-1"/>"#.into());
-        found(&bdpt::SPEC, &prepare(parse(&xml, &[]), Backend::default_available(), None), &[], 16)
+        found(
+            &bdpt::SPEC,
+            &prepare(parse(&xml, &[]), Backend::default_available(), None),
+            &[("path_fallback", "false")],
+            16,
+        )
     };
     let unit = room(1.0);
     assert!(unit.len() > 500, "{}", unit.len());
