@@ -12,7 +12,7 @@
 //! A path tracer may miss in its few samples what it finds rarely. The method has found such light: its own samples
 //! predict the variance of hits and next event with a thousandth of the light sub-paths and connections
 //! ([`SampleAllocation::EYE_ONLY`]), and with eye sub-paths that end as soon as its own do, which is too pessimistic by
-//! a factor. Path tracing is trusted with no less than that variance over [`PREDICTION_EXCESS`].
+//! a factor. Path tracing is trusted with no less than that variance over `PREDICTION_EXCESS`.
 //!
 //! [`SampleAllocation::EYE_ONLY`]: crate::mis::SampleAllocation::EYE_ONLY
 
