@@ -14,6 +14,7 @@ pub mod filter;
 pub mod light;
 pub mod lights;
 mod orientation;
+mod power;
 pub mod round;
 pub mod sample;
 mod spherical_triangle;

@@ -3,13 +3,13 @@
 //! A sphere is sampled uniformly in the solid angle of the part that faces the reference point: seen from outside it
 //! fills a cone, from inside all directions. Disks and cylinders are sampled uniformly in area.
 
+use super::power::{diffuse_power, mean_radiance};
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::triangle::RadianceTexture;
 use crate::math::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
 use crate::math::{AreaPdf, DVec3, Frame, Rgb, SolidAnglePdf, Vec3};
 use crate::ray::{RoundPoint, RoundShape};
 use crate::scene::RoundKind;
-use std::f32::consts::PI;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -52,9 +52,6 @@ enum View {
 
 /// Points per side of the grid on which a textured shape's mean radiance is taken.
 const POWER_GRID: u32 = 32;
-/// Part of its texture's mean that a textured shape is credited with at least: the grid may miss its bright texels, but
-/// the shape must keep a probability.
-const POWER_FLOOR: f32 = 0.01;
 
 /// Smallest 1 − cos of the half angle of a cone that is sampled.
 const MIN_VERSINE: f64 = 1e-30;
@@ -124,8 +121,7 @@ impl RoundLight {
         });
         let inv_area = if area > 0.0 { (1.0 / area) as f32 } else { 0.0 };
         let mut light = RoundLight { shape, inv_area, power: 0.0, emission, ball };
-        let power = PI * area as f32 * light.mean_radiance().luminance();
-        light.power = if power.is_finite() { power.max(0.0) } else { 0.0 };
+        light.power = diffuse_power(area as f32, light.mean_radiance());
         light
     }
 
@@ -133,12 +129,8 @@ impl RoundLight {
         match &self.emission {
             RoundEmission::Constant(radiance) => *radiance,
             RoundEmission::Textured(texture) => {
-                let n = POWER_GRID;
-                let at = |i: u32| [i % n, i / n].map(|i| (i as f32 + 0.5) / n as f32);
-                let code = |i: u32| self.shape.encode(self.shape.sample_unit(at(i)));
-                let sum: Rgb = (0..n * n).map(|i| self.radiance(code(i))).sum();
-                let (mean, floor) = (sum / (n * n) as f32, texture.mean() * POWER_FLOOR);
-                if mean.luminance() > floor.luminance() { mean } else { floor }
+                let code = |u: [f32; 2]| self.shape.encode(self.shape.sample_unit(u));
+                mean_radiance(POWER_GRID, &**texture, |u| self.radiance(code(u)))
             }
         }
     }

@@ -4,12 +4,12 @@
 //! uniformly in area when it is small and the two hardly differ. Which of them is a function of the point and the
 //! triangle alone.
 
+use super::power::{diffuse_power, mean_radiance};
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::spherical_triangle::SphericalTriangle;
 use crate::math::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere, square_to_triangle};
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec2, Vec3};
 use crate::ray::offset::interpolation_error;
-use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// A picture of radiance over texture space.
@@ -54,9 +54,6 @@ pub struct TriangleLight {
 
 /// Points per edge of the grid on which a textured triangle's mean radiance is taken.
 const POWER_GRID: u32 = 8;
-/// Part of its texture's mean that a textured triangle is credited with at least: the grid may miss its bright texels,
-/// but the triangle must keep a probability.
-const POWER_FLOOR: f32 = 0.01;
 
 /// Area over squared distance to the nearest point (the solid angle of a facing triangle) from which on a triangle is
 /// sampled by solid angle. Sampling by area leaves the variation of cos/d² over the triangle in the estimate, which
@@ -81,8 +78,7 @@ impl TriangleLight {
         let spherical_until2 = (radius + (area / SPHERICAL_FROM).sqrt()).powi(2);
         let inv_area = if area > 0.0 { 1.0 / area } else { 0.0 };
         let mut light = TriangleLight { v, ng, area, inv_area, centre, spherical_until2, power: 0.0, emission };
-        let power = PI * area * light.mean_radiance().luminance();
-        light.power = if power.is_finite() { power.max(0.0) } else { 0.0 };
+        light.power = diffuse_power(area, light.mean_radiance());
         light
     }
 
@@ -90,14 +86,7 @@ impl TriangleLight {
         match &self.emission {
             TriangleEmission::Constant(radiance) => *radiance,
             TriangleEmission::Textured(t) => {
-                let n = POWER_GRID;
-                let at = |i: u32| ((i % n) as f32 + 0.5, (i / n) as f32 + 0.5);
-                let sum: Rgb = (0..n * n)
-                    .map(|i| self.radiance(square_to_triangle([at(i).0 / n as f32, at(i).1 / n as f32])))
-                    .sum();
-                let mean = sum / (n * n) as f32;
-                let floor = t.texture.mean() * POWER_FLOOR;
-                if mean.luminance() > floor.luminance() { mean } else { floor }
+                mean_radiance(POWER_GRID, &*t.texture, |u| self.radiance(square_to_triangle(u)))
             }
         }
     }

@@ -261,7 +261,7 @@ fn readers_survive_mutated_files() {
 
 /// Each reader for FUZZ_SECONDS (20 if that is not set), with a seed of the clock.
 #[test]
-#[ignore = "as long as one likes"]
+#[ignore = "a long run by hand; the bounded one is readers_survive_mutated_files"]
 fn long_run() {
     let seconds = std::env::var("FUZZ_SECONDS").ok().and_then(|s| s.parse().ok()).unwrap_or(20);
     let seed = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs();

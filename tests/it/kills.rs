@@ -62,7 +62,7 @@ fn killed_renders_go_on_bit_by_bit() {
 
 /// The long version, for `cargo test -- --ignored`.
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "a long run by hand; the bounded one is killed_renders_go_on_bit_by_bit"]
 fn a_hundred_kills_lose_nothing() {
     let [killed, resumed] = kill(12);
     println!("{killed} renders were killed; {resumed} began from a checkpoint");

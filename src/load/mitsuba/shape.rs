@@ -11,7 +11,7 @@ use crate::math::{Frame, Rgb};
 use crate::scene::diag::Diagnostic;
 use crate::scene::{
     AreaEmission, BsdfDesc, BsdfId, ColorDesc, DiffuseParams, GroupDesc, GroupId, InstanceDesc, RoundKind, ShapeDesc,
-    ShapeGeometry,
+    ShapeGeometry, Span,
 };
 use glam::{DMat4, DVec3};
 
@@ -22,6 +22,22 @@ const PLUGINS: [&str; 10] =
 enum Source {
     Mesh(MeshSource),
     Round(RoundKind),
+}
+
+/// A surface without its material and emission.
+struct Outline {
+    source: Source,
+    to_world: DMat4,
+    options: MeshOptions,
+    /// Its file name, or else the whole element.
+    span: Span,
+}
+
+/// The elements inside of a surface.
+struct Parts {
+    /// A BSDF or a reference to one.
+    material: Option<usize>,
+    emission: Option<AreaEmission>,
 }
 
 impl Source {
@@ -118,8 +134,28 @@ impl Builder<'_> {
 
     /// Any shape that is a surface.
     fn surface(&mut self, p: &Props<'_>) -> Option<ShapeDesc> {
-        let mut to_world = p.transform("to_world").unwrap_or(DMat4::IDENTITY);
+        let mut outline = self.outline(p)?;
         let flip_normals = p.boolean_or("flip_normals", false);
+        p.ignore(&["silhouette_sampling_weight"]);
+        let Parts { material, emission } = self.parts(p);
+        p.finish();
+        let mut bsdf = material.and_then(|m| self.bsdf(m));
+        outline.options.colors = material.map_or(MeshColors::Unused, |m| self.mesh_colors(m));
+        // As in Mitsuba 3, a light without a material reflects nothing.
+        if emission.is_some() && bsdf.is_none() {
+            let kind = DiffuseParams { reflectance: ColorDesc::Constant(Rgb::BLACK) }.into();
+            self.scene.bsdfs.push(BsdfDesc { name: None, kind, span: None });
+            bsdf = Some(BsdfId((self.scene.bsdfs.len() - 1) as u32));
+        }
+        let to_world = outline.to_world;
+        let geometry = self.geometry(outline, emission.is_some());
+        let name = p.element().attr("id").map(|a| a.value.clone());
+        Some(ShapeDesc { geometry, to_world, bsdf, emission, flip_normals, name, span: Some(p.span()) })
+    }
+
+    /// The outline that the plugin itself describes.
+    fn outline(&mut self, p: &Props<'_>) -> Option<Outline> {
+        let mut to_world = p.transform("to_world").unwrap_or(DMat4::IDENTITY);
         let mut span = p.span();
         let mut options = MeshOptions::default();
         let source = match p.plugin {
@@ -132,10 +168,7 @@ impl Builder<'_> {
                 Source::Mesh(match p.plugin {
                     "ply" => MeshSource::Ply(path),
                     "obj" => MeshSource::Obj(path),
-                    _ => {
-                        let index = p.count("shape_index").unwrap_or(0);
-                        MeshSource::Serialized(path, index)
-                    }
+                    _ => MeshSource::Serialized(path, p.count("shape_index").unwrap_or(0)),
                 })
             }
             "rectangle" => Source::Mesh(MeshSource::Primitive(Primitive::Rectangle)),
@@ -157,15 +190,17 @@ impl Builder<'_> {
             }
         };
         options.mirrored = to_world.determinant() < 0.0;
+        Some(Outline { source, to_world, options, span })
+    }
 
-        let mut material = p.get_index("bsdf");
-        let mut emission = None;
-        p.ignore(&["silhouette_sampling_weight"]);
+    /// The elements inside of a surface.
+    fn parts(&mut self, p: &Props<'_>) -> Parts {
+        let mut parts = Parts { material: p.get_index("bsdf"), emission: None };
         for object in p.objects() {
             let Some(found) = self.resolve(object) else { continue };
             match self.node(found).tag.as_str() {
-                "bsdf" => material = Some(object),
-                "emitter" => emission = self.area_emission(found),
+                "bsdf" => parts.material = Some(object),
+                "emitter" => parts.emission = self.area_emission(found),
                 "medium" => {
                     let d = Diagnostic::unsupported("participating media are not supported");
                     self.push(d.at(self.node(object).span.clone()).help(FORCE));
@@ -177,30 +212,23 @@ impl Builder<'_> {
                 }
             }
         }
-        p.finish();
-        let mut bsdf = material.and_then(|m| self.bsdf(m));
-        options.colors = material.map_or(MeshColors::Unused, |m| self.mesh_colors(m));
-        // As in Mitsuba 3, a light without a material reflects nothing.
-        if emission.is_some() && bsdf.is_none() {
-            let kind = DiffuseParams { reflectance: ColorDesc::Constant(Rgb::BLACK) }.into();
-            self.scene.bsdfs.push(BsdfDesc { name: None, kind, span: None });
-            bsdf = Some(BsdfId((self.scene.bsdfs.len() - 1) as u32));
-        }
-        let source = source.for_placement(&to_world, emission.is_some());
-        let geometry = match source {
+        parts
+    }
+
+    fn geometry(&mut self, outline: Outline, emits: bool) -> ShapeGeometry {
+        let Outline { source, to_world, options, span } = outline;
+        match source.for_placement(&to_world, emits) {
             Source::Round(kind) => {
                 if options.colors != MeshColors::Unused {
                     let attribute = options.colors.attribute();
                     let message =
                         format!("a texture asks for `{attribute}`, which spheres, disks and cylinders do not have");
-                    self.push(Diagnostic::error("load::missing-attribute", message).at(span.clone()));
+                    self.push(Diagnostic::error("load::missing-attribute", message).at(span));
                 }
                 ShapeGeometry::Round(kind)
             }
             Source::Mesh(mesh) => ShapeGeometry::Mesh(self.assets.mesh(mesh, options, span)),
-        };
-        let name = p.element().attr("id").map(|a| a.value.clone());
-        Some(ShapeDesc { geometry, to_world, bsdf, emission, flip_normals, name, span: Some(p.span()) })
+        }
     }
 
     fn area_emission(&mut self, node: usize) -> Option<AreaEmission> {
