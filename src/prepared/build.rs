@@ -1,5 +1,6 @@
 //! Building a [`PreparedScene`]: place, clean, centre, and hand each part to the room that knows it.
 
+use super::coplanar::raise_emitters;
 use super::lights::{Extent, all_lights};
 use super::limits::{MAX_REACH, check_instances};
 use super::placing::{PlacedScene, centre};
@@ -77,6 +78,7 @@ impl PreparedScene {
 
         let centre = centre(&desc);
         let mut placed = PlacedScene::new(&mut desc, centre, &materials, diagnostics);
+        raise_emitters(&mut placed, diagnostics);
         let (lo, hi) = placed.geometry.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
         let radius = lo.abs().max(hi.abs()).length();
         let camera = Camera::new(&sensor, centre)?;

@@ -35,6 +35,13 @@ impl MeshShading {
         self.normals.len() * 12 + self.uvs.len() * 8 + self.colors.len() * 12
     }
 
+    /// Appends a copy of the data of vertex `i`.
+    pub(super) fn repeat_vertex(&mut self, i: usize) {
+        self.normals.extend(self.normals.get(i).copied());
+        self.uvs.extend(self.uvs.get(i).copied());
+        self.colors.extend(self.colors.get(i).copied());
+    }
+
     /// Fills in the shading normal (as `frame.n`), texture coordinates, their derivatives and the colour of the point
     /// with barycentrics `b` on the triangle with vertex indices `i`. The point holds the triangle's edges v1 − v0 and
     /// v2 − v0 as derivatives.

@@ -5,6 +5,8 @@
 //! backend, and notes which [`features`] the scene has, so that nobody pays for what it lacks.
 
 pub mod build;
+mod coplanar;
+mod facet;
 pub mod features;
 mod lights;
 mod limits;

@@ -70,6 +70,12 @@ impl RoundShape {
         RoundShape { to_place, from_place: to_place.inverse(), ..self.clone() }
     }
 
+    /// The shape moved by `shift`.
+    pub fn moved(&self, shift: DVec3) -> RoundShape {
+        let to_place = DAffine3 { translation: self.to_place.translation + shift, ..self.to_place };
+        RoundShape { to_place, from_place: to_place.inverse(), ..self.clone() }
+    }
+
     /// The front is the outside of a sphere or cylinder, or the upper side of a disk.
     pub fn is_outward(&self) -> bool {
         self.outward

@@ -7,6 +7,7 @@ mod bad_input;
 mod checkpoints;
 mod cli;
 mod cli_techniques;
+mod coplanar;
 mod factors;
 mod fallback;
 mod furnace;
