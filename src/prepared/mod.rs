@@ -8,6 +8,7 @@ pub mod build;
 mod coplanar;
 mod facet;
 pub mod features;
+mod flat_edges;
 mod lights;
 mod limits;
 pub mod mesh;
@@ -94,7 +95,7 @@ impl PreparedScene {
         let mesh = &self.meshes[hit.mesh as usize];
         if let Some(shape) = self.geometry.round_shape(hit.mesh) {
             let code = [hit.u, hit.v];
-            let RoundPoint { p, error, ng } = shape.point(code);
+            let RoundPoint { p, error, ng } = shape.point_off_edges(code, 0.0);
             (point.p, point.error, point.ng, point.frame.n) = (p, error, ng, ng);
             if mesh.wants_uvs {
                 let RoundUv { uv, dpdu, dpdv } = shape.parametrise(code);
@@ -105,7 +106,7 @@ impl PreparedScene {
             mesh.interpolate(&indices, [1.0 - hit.u - hit.v, hit.u, hit.v], point);
         }
         if hit.instance != NONE {
-            self.place(point, hit.instance);
+            self.place(point, &hit);
         }
         point.frame = if mesh.wants_tangents {
             Frame::from_normal_tangent(point.frame.n, point.dpdu)
@@ -116,9 +117,9 @@ impl PreparedScene {
 
     /// From group space to the world; `frame.n` carries the shading normal.
     #[cold]
-    fn place(&self, point: &mut SurfacePoint, instance: u32) {
-        let m: &Affine3A = &self.geometry.instances[instance as usize].to_world;
-        let normals = &self.instance_normals[instance as usize];
+    fn place(&self, point: &mut SurfacePoint, hit: &Hit) {
+        let m: &Affine3A = &self.geometry.instances[hit.instance as usize].to_world;
+        let normals = &self.instance_normals[hit.instance as usize];
         // The bound grows with the map's absolute values, and the map itself rounds; the backend rounds the ray into
         // group space as well, which the last factor covers.
         let linear = m.matrix3;
@@ -126,6 +127,18 @@ impl PreparedScene {
         let gain = (linear.x_axis.abs() + linear.y_axis.abs() + linear.z_axis.abs()).max_element();
         let rounding = crate::math::float::gamma(6) * (absolute + Vec3::from(m.translation).abs()).max_element();
         point.error = 2.0 * (gain * point.error + rounding);
+        // The edges of group space keep off by what the error is there: lengths shrink by the norm of the inverse at most.
+        let shrink =
+            normals.x_axis.length_squared() + normals.y_axis.length_squared() + normals.z_axis.length_squared();
+        let (code, in_group) = ([hit.u, hit.v], point.error * shrink.sqrt());
+        let moved = match self.geometry.round_shape(hit.mesh) {
+            Some(shape) => Some(shape.point_off_edges(code, in_group).p),
+            None => {
+                let triangle = self.triangles.triangle(self.triangles.mesh(hit), hit);
+                triangle.moved_off_edges([1.0 - hit.u - hit.v, hit.u, hit.v], in_group)
+            }
+        };
+        point.p = moved.unwrap_or(point.p);
         point.p = m.transform_point3(point.p);
         point.ng = (*normals * point.ng).normalize();
         point.frame.n = (*normals * point.frame.n).normalize();

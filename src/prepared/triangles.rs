@@ -1,31 +1,60 @@
 //! Triangles as hits look them up: one cache line each, found without going through the index and vertex buffers.
 //!
 //! A ray meets triangles in no order that a cache could learn, so what counts is the number of lines that a hit touches
-//! and how many of them must arrive one after the other. The corners and the normal of a triangle fill exactly one
-//! line.
+//! and how many of them must arrive one after the other. The corners and the normal of a triangle, and the inverses of
+//! its heights, fill exactly one line.
+//!
+//! A point that is met within its rounding error of an edge may be behind the surface that is joined there: the next ray
+//! would start outside of a closed body. Such a point is moved into its triangle, to [`EDGE_MARGIN`] times its error bound
+//! from the edge. Edges inside of flat regions ([`flat_edges`]) join no other surface: points stay on them.
 
 use super::MeshShading;
+use super::flat_edges::flat_edges;
 use crate::math::Vec3;
-use crate::ray::offset::interpolation_error;
+use crate::ray::offset::{EDGE_MARGIN, interpolation_error};
 use crate::ray::{Geometry, Hit};
 use crate::scene::BsdfId;
-use glam::Vec3A;
+use glam::{Vec3A, Vec4};
+use rayon::prelude::*;
+
+/// A point is moved into its triangle by this many margins at most, however thin the triangle is.
+const FARTHEST: f32 = 2.0;
+
+/// Stands for the inverse of the height over an edge that points need not keep off: all are far from it.
+const FAR: f32 = -1e38;
 
 /// Corners and normal of one triangle, in the space of its mesh.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Triangle {
-    corners: [Vec3A; 3],
+    /// Corners, with the inverse of the height over the opposite edge as fourth component.
+    corners: [Vec4; 3],
     ng: Vec3A,
 }
 
 impl Triangle {
     /// Stands where a round shape has no triangle, so that hits on triangles need not ask.
-    const PLACEHOLDER: Triangle = Triangle { corners: [Vec3A::ZERO, Vec3A::X, Vec3A::Y], ng: Vec3A::Z };
+    const PLACEHOLDER: Triangle = Triangle {
+        corners: [Vec4::new(0.0, 0.0, 0.0, FAR), Vec4::new(1.0, 0.0, 0.0, FAR), Vec4::new(0.0, 1.0, 0.0, FAR)],
+        ng: Vec3A::Z,
+    };
 
-    fn new(corners: [Vec3; 3]) -> Triangle {
-        let ng = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-        Triangle { corners: corners.map(Vec3A::from), ng: ng.into() }
+    /// Bit `i` of `flat`: the edge opposite to corner `i` is inside of a flat region.
+    fn new(corners: [Vec3; 3], flat: u8) -> Triangle {
+        let [a, b, c] = corners;
+        let cross = (b - a).cross(c - a);
+        let twice_area = cross.length();
+        let opposite = [c - b, c - a, b - a];
+        let inverse_height = |i: usize| {
+            let inverse = opposite[i].length() / twice_area;
+            match flat >> i & 1 {
+                1 => FAR,
+                _ if inverse.is_finite() => inverse,
+                _ => f32::MAX,
+            }
+        };
+        let corners = std::array::from_fn(|i| corners[i].extend(inverse_height(i)));
+        Triangle { corners, ng: cross.normalize().into() }
     }
 
     /// Unit normal.
@@ -37,15 +66,56 @@ impl Triangle {
     /// The edges v1 − v0 and v2 − v0.
     #[inline]
     pub fn edges(&self) -> [Vec3; 2] {
-        [(self.corners[1] - self.corners[0]).into(), (self.corners[2] - self.corners[0]).into()]
+        let [a, b, c] = self.corners.map(Vec3A::from_vec4);
+        [(b - a).into(), (c - a).into()]
     }
 
-    /// The point with barycentrics `b` and its error bound.
+    /// The point with barycentrics `b`, moved off the edges, and its error bound.
     #[inline]
     pub fn at(&self, b: [f32; 3]) -> (Vec3, f32) {
-        let [a, b, c] = [self.corners[0] * b[0], self.corners[1] * b[1], self.corners[2] * b[2]];
+        let (p, error) = self.interpolate(b);
+        let margin = EDGE_MARGIN * error;
+        if self.is_inside(b, margin) { (p, error) } else { self.off_edges(b, p, margin) }
+    }
+
+    /// The point with barycentrics `b`, off the edges by the margin for points with the error bound `error`, which is
+    /// larger than that of the interpolation; `None` if it is so as it is.
+    pub fn moved_off_edges(&self, b: [f32; 3], error: f32) -> Option<Vec3> {
+        let margin = EDGE_MARGIN * error;
+        (!self.is_inside(b, margin)).then(|| self.off_edges(b, self.interpolate(b).0, margin).0)
+    }
+
+    #[inline]
+    fn interpolate(&self, b: [f32; 3]) -> (Vec3, f32) {
+        let [p, q, r] = self.corners.map(Vec3A::from_vec4);
+        let [a, b, c] = [p * b[0], q * b[1], r * b[2]];
         let bound = (a.abs() + b.abs() + c.abs()).max_element();
         ((a + b + c).into(), interpolation_error(bound))
+    }
+
+    /// No edge is nearer than `margin`.
+    #[inline]
+    fn is_inside(&self, b: [f32; 3], margin: f32) -> bool {
+        let [p, q, r] = &self.corners;
+        b[0] >= margin * p.w && b[1] >= margin * q.w && b[2] >= margin * r.w
+    }
+
+    /// The point `p` with barycentrics `b`, moved away from edges that are nearer than `margin`.
+    #[cold]
+    #[inline(never)]
+    fn off_edges(&self, b: [f32; 3], p: Vec3, margin: f32) -> (Vec3, f32) {
+        // In a triangle thinner than three margins the middle is the farthest from all edges.
+        let least: [f32; 3] = std::array::from_fn(|i| match self.corners[i].w {
+            FAR => b[i].min(0.0),
+            inverse => (margin * inverse).min(1.0 / 3.0),
+        });
+        let spare: [f32; 3] = std::array::from_fn(|i| (b[i] - least[i]).max(0.0));
+        let (all, free) = (spare.iter().sum::<f32>(), 1.0 - least.iter().sum::<f32>());
+        let share = if all > 0.0 { free.max(0.0) / all } else { 0.0 };
+        let (inside, error) = self.interpolate(std::array::from_fn(|i| least[i] + spare[i] * share));
+        let (shift, farthest) = (inside - p, FARTHEST * margin);
+        let length = shift.length();
+        if length > farthest { (p + shift * (farthest / length), error) } else { (inside, error) }
     }
 }
 
@@ -86,14 +156,16 @@ impl TriangleTable {
         let placeholders = usize::from(!geometry.round.is_empty());
         let count: usize = geometry.meshes.iter().map(|m| m.triangles.len()).sum();
         table.triangles.reserve_exact(count + placeholders);
-        for (buffers, shading) in geometry.meshes.iter().zip(shading) {
+        let flat: Vec<Vec<u8>> = geometry.meshes.par_iter().map(flat_edges).collect();
+        for ((buffers, shading), flat) in geometry.meshes.iter().zip(shading).zip(flat) {
             table.meshes.push(MeshEntry {
                 first_triangle: table.triangles.len() as u32,
                 first_light: shading.first_light.unwrap_or(MeshEntry::DARK),
                 material: shading.material,
                 plain: shading.is_plain(),
             });
-            table.triangles.extend((0..buffers.triangles.len()).map(|i| Triangle::new(buffers.corners(i as u32))));
+            let triangles = (0u32..).zip(flat).map(|(i, flat)| Triangle::new(buffers.corners(i), flat));
+            table.triangles.extend(triangles);
         }
         let placeholder = table.triangles.len() as u32;
         for shading in shading.iter().skip(geometry.meshes.len()) {

@@ -10,6 +10,11 @@ use crate::math::{Vec3, float::gamma};
 
 const SQRT_3: f32 = 1.732_050_8;
 
+/// Error bounds that hit points keep from the edges of their surface. A ray leaves its surface √3 bounds above it; beside
+/// another surface that rises from the edge at an angle θ, a point √3 / tan(θ/2) bounds from the edge stays before both:
+/// this margin is enough for angles of 25 degrees and more.
+pub const EDGE_MARGIN: f32 = 8.0;
+
 /// Error bound of a point Σ b_i v_i interpolated between three corners v_i with weights b_i that sum to one, and of
 /// moving it off the surface: γ(7) for the point and two roundings for the move. `sum` is the largest component of Σ
 /// |b_i v_i|.

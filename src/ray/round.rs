@@ -5,6 +5,7 @@
 //! which stand where a triangle's barycentrics do; the point made from them is on the surface again.
 
 use super::SurfaceMask;
+use super::offset::EDGE_MARGIN;
 use crate::math::float::gamma;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::RoundKind;
@@ -202,6 +203,28 @@ impl RoundShape {
         self.point_of(self.decode(code))
     }
 
+    /// The point with the given code, moved off the edge of a disk or cylinder, where another surface may be joined, by
+    /// [`EDGE_MARGIN`] times the larger one of its own error bound and `error`.
+    pub fn point_off_edges(&self, code: [f32; 2], error: f32) -> RoundPoint {
+        let x = self.decode(code);
+        let point = self.point_of(x);
+        if self.kind == RoundKind::Sphere {
+            return point;
+        }
+        let margin = (f64::from(EDGE_MARGIN * point.error.max(error)) * self.shrink()).min(0.5);
+        let off_edges = match self.kind {
+            RoundKind::Disk => x * ((1.0 - margin) / x.length()).min(1.0),
+            _ => x.with_z(x.z.clamp(margin, 1.0 - margin)),
+        };
+        if off_edges == x { point } else { self.point_of(off_edges) }
+    }
+
+    /// Bound on how much the map to the unit shape lengthens: its Frobenius norm.
+    fn shrink(&self) -> f64 {
+        let m = &self.from_place.matrix3;
+        (m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared()).sqrt()
+    }
+
     /// The image of the point `x` of the unit shape.
     pub fn point_of(&self, x: DVec3) -> RoundPoint {
         let p = self.to_place.transform_point3(x).as_vec3();
@@ -256,9 +279,6 @@ impl RoundShape {
 
     /// False only if the ball around `centre` does not touch the surface.
     pub fn may_touch_ball(&self, centre: DVec3, radius: f64) -> bool {
-        let m = &self.from_place.matrix3;
-        // The Frobenius norm bounds how much the map lengthens.
-        let norm = (m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared()).sqrt();
         let x = self.from_place.transform_point3(centre);
         let r = x.truncate().length();
         let distance = match self.kind {
@@ -266,7 +286,7 @@ impl RoundShape {
             RoundKind::Disk => x.z.hypot((r - 1.0).max(0.0)),
             RoundKind::Cylinder => (r - 1.0).hypot((-x.z).max(x.z - 1.0).max(0.0)),
         };
-        distance <= radius * norm
+        distance <= radius * self.shrink()
     }
 }
 

@@ -15,6 +15,7 @@ mod fuzz;
 mod image_metrics;
 mod images;
 mod kills;
+mod leaks;
 mod measure;
 mod options;
 mod outputs;

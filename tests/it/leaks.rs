@@ -1,0 +1,151 @@
+//! Closed bodies do not leak: rays that meet a surface within the rounding error of an edge leave it on the inside.
+
+use crate::support::pictures::{parse, prepare};
+use lightsieve::math::hash::HashRng;
+use lightsieve::math::warp::square_to_sphere;
+use lightsieve::math::{Frame, Vec3};
+use lightsieve::prepared::PreparedScene;
+use lightsieve::ray::offset::offset_point;
+use lightsieve::ray::{Backend, MeshBuffers, Ray};
+use lightsieve::scene::RoundKind;
+
+const CAMERA: &str = r#"<sensor type="perspective"><film type="hdrfilm"/></sensor>"#;
+const TURNED: &str = r#"<rotate x="0.26726" y="0.53452" z="0.80178" angle="37"/>"#;
+/// A cube of which one side has a vertex more, on an edge that the neighbouring side does not split.
+const T_JUNCTION: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\nv 1 0.3 1\n\
+    f 1 2 3\nf 1 3 4\nf 5 6 9\nf 5 9 8\nf 9 7 8\nf 2 3 7\nf 2 7 6\nf 1 4 8\nf 1 8 5\nf 1 2 6\nf 1 6 5\nf 4 3 7\nf 4 7 8\n";
+/// Rays aimed at the edges of a body.
+const RAYS: u32 = 200_000;
+
+fn body(shapes: &str, backend: Backend) -> PreparedScene {
+    let files = [("cube.obj", T_JUNCTION)];
+    prepare(parse(&format!("{CAMERA}{shapes}<emitter type=\"constant\"/>"), &files), backend, None)
+}
+
+fn transform(inside: &str) -> String {
+    format!("<transform name=\"to_world\">{inside}</transform>")
+}
+
+fn cube(turn: &str) -> String {
+    format!("<shape type=\"cube\">{}</shape>", transform(turn))
+}
+
+/// Six rectangles with corners of their own, which touch along open edges.
+fn rectangles(turn: &str) -> String {
+    let sides =
+        ["", "<rotate x=\"1\" angle=\"180\"/>", "<rotate x=\"1\" angle=\"90\"/>", "<rotate x=\"1\" angle=\"-90\"/>"];
+    let sides = sides.into_iter().chain(["<rotate y=\"1\" angle=\"90\"/>", "<rotate y=\"1\" angle=\"-90\"/>"]);
+    sides
+        .map(|side| {
+            format!("<shape type=\"rectangle\">{}</shape>", transform(&format!("<translate z=\"1\"/>{side}{turn}")))
+        })
+        .collect()
+}
+
+/// The ends of all edges of the body's triangles; where there are none, points of its rims or surface.
+fn edges(scene: &PreparedScene) -> Vec<[Vec3; 2]> {
+    let mut edges = vec![];
+    let round = scene.geometry.round.iter();
+    for shape in round {
+        let along = |i: u32| {
+            [if shape.kind == RoundKind::Sphere { i as f32 / 1000.0 } else { 0.999_999_9 }, i as f32 * 0.618_034 % 1.0]
+        };
+        edges.extend((0..1000).map(|i| [shape.point_of(shape.sample_unit(along(i))).p; 2]));
+    }
+    let middle = -scene.centre.as_vec3();
+    // What is elsewhere only moves the body away from the scene's centre.
+    let is_body = |mesh: &&MeshBuffers| mesh.positions.iter().all(|p| p.distance(middle) < 2.0);
+    for mesh in scene.geometry.meshes.iter().filter(is_body) {
+        for i in 0..mesh.triangles.len() as u32 {
+            let [a, b, c] = mesh.corners(i);
+            edges.extend([[a, b], [b, c], [c, a]]);
+        }
+    }
+    edges
+}
+
+/// A random number that is often tiny.
+fn tiny(rng: &mut HashRng) -> f32 {
+    let size = 10f32.powf(-3.0 - 6.0 * rng.next_f32());
+    size * (rng.next_f32() - 0.5)
+}
+
+/// Escaped rays: those from the inside to points of edges and corners, and those that leave the points that these meet.
+fn leaks(scene: &PreparedScene, edges: &[[Vec3; 2]]) -> (u32, u32) {
+    let mut rng = HashRng::new(1, 2, 3, 4);
+    let (mut first, mut second) = (0, 0);
+    for i in 0..RAYS {
+        let [a, b] = edges[i as usize % edges.len()];
+        let [x, y, z, along] = rng.next_4();
+        // One in five near a corner.
+        let along = if i % 5 == 0 { tiny(&mut rng).abs() } else { along };
+        let target = a.lerp(b, along) + Vec3::new(tiny(&mut rng), tiny(&mut rng), tiny(&mut rng));
+        let o = (Vec3::new(x, y, z) - 0.5) * 0.6 - scene.centre.as_vec3();
+        let d = (target - o).normalize();
+        let Some(hit) = scene.query.closest(&Ray::leaving(o, d)) else {
+            first += 1;
+            continue;
+        };
+        let (point, _) = scene.surface_point(&hit);
+        let normal = if point.ng.dot(d) > 0.0 { -point.ng } else { point.ng };
+        let out = square_to_sphere([rng.next_f32(), rng.next_f32()]);
+        let out = if out.dot(normal) < 0.0 { Frame::from_normal(normal).to_world(Vec3::Z) - out } else { out };
+        let leaving = Ray::leaving(offset_point(point.p, point.error, point.ng, out), out);
+        second += u32::from(out.dot(normal) > 0.0 && scene.query.closest(&leaving).is_none());
+    }
+    (first, second)
+}
+
+#[track_caller]
+fn is_tight(what: &str, shapes: &str) {
+    for backend in [Backend::default_available(), Backend::Obvhs] {
+        let scene = body(shapes, backend);
+        let edges = edges(&scene);
+        let found = leaks(&scene, &edges);
+        assert_eq!(found, (0, 0), "{what}, {backend:?}: rays that miss the edge, rays that leave the point met");
+    }
+}
+
+#[test]
+fn cubes_are_tight() {
+    is_tight("cube", &cube(""));
+    is_tight("turned cube", &cube(TURNED));
+    let far = transform("<translate x=\"5\" y=\"7\" z=\"9\"/>");
+    let around = format!("{}<shape type=\"cube\">{far}</shape>", cube(TURNED));
+    is_tight("turned cube away from the centre", &around);
+}
+
+#[test]
+fn t_junctions_are_tight() {
+    let cube = |turn: &str| {
+        format!("<shape type=\"obj\"><string name=\"filename\" value=\"cube.obj\"/>{}</shape>", transform(turn))
+    };
+    is_tight("T-junctions", &cube(""));
+    is_tight("turned T-junctions", &cube(TURNED));
+}
+
+#[test]
+fn open_edges_that_touch_are_tight() {
+    is_tight("rectangles", &rectangles(""));
+    is_tight("turned rectangles", &rectangles(TURNED));
+}
+
+#[test]
+fn round_bodies_are_tight() {
+    is_tight("sphere", &format!("<shape type=\"sphere\">{}</shape>", transform(TURNED)));
+    let cap = |turn: &str| format!("<shape type=\"disk\">{}</shape>", transform(turn));
+    let wall = format!(
+        "<shape type=\"cylinder\">{}</shape>",
+        transform(&format!("<scale z=\"2\"/><translate z=\"-1\"/>{TURNED}"))
+    );
+    let caps = ["-1", "1"].map(|z| cap(&format!("<translate z=\"{z}\"/>{TURNED}")));
+    is_tight("can", &format!("{wall}{}", caps.concat()));
+}
+
+#[test]
+fn instances_are_tight() {
+    let group = format!("<shape type=\"shapegroup\" id=\"g\">{}</shape>", cube(""));
+    let placed =
+        format!("<shape type=\"instance\"><ref id=\"g\"/>{}</shape>", transform("<scale x=\"0.8\" y=\"1.3\"/>"));
+    is_tight("instance", &format!("{group}{placed}"));
+}
