@@ -83,10 +83,10 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         tracer.end(Work::Weights, started);
         let segment = segment(&z.segment_end(), &y.place.segment_end());
         let origin = to.number.map_or(PathOrigin::Known(to.origin), PathOrigin::Stored);
-        let contribution = self.contribution((y.length(), t), origin, raw, weight);
-        let sink = &mut *self.sink;
+        let contribution = self.contribution((y.length(), t), origin, (raw, weight), Some(&segment));
+        let (sink, heuristic) = (&mut *self.sink, mis.heuristic);
         self.queues.connection.push(&segment, contribution, tracer, |c, transmittance| {
-            sink.add(ContributionKind::Connection, c.attenuated(transmittance));
+            sink.add(ContributionKind::Connection, c.through(transmittance, heuristic));
         });
     }
 

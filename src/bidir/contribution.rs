@@ -3,8 +3,8 @@
 pub use crate::film::ContributionKind;
 use crate::film::Splat;
 use crate::math::Rgb;
-use crate::mis::MisWeight;
-use crate::path::Transmittance;
+use crate::mis::{Heuristic, MisWeight};
+use crate::ray::Transmittance;
 
 /// A contribution of the technique (s, t).
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,8 +36,13 @@ impl Contribution {
 
     /// The contribution after a visibility ray has passed.
     #[inline]
-    pub fn attenuated(self, transmittance: Transmittance) -> Contribution {
-        Contribution { raw: self.raw * transmittance, ..self }
+    pub fn through(self, transmittance: Transmittance, heuristic: Heuristic) -> Contribution {
+        if transmittance.is_one() {
+            return self;
+        }
+        let technique = (usize::from(self.s), usize::from(self.t));
+        let weight = self.weight.through(transmittance, heuristic, technique);
+        Contribution { raw: self.raw * transmittance, weight, ..self }
     }
 
     /// As a splat of the light image.

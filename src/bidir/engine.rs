@@ -274,7 +274,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         let mut samples = std::mem::take(&mut self.samples);
         samples.resize_with(film.tiles.len(), SampleBuffer::default);
         let this = &*self;
-        let scratch = || ThreadScratch::new(this.probe_stride);
+        let scratch = || ThreadScratch::new(this.probe_stride, this.mis.heuristic);
         let mut phases = Phases::default();
         let tiles = film
             .tiles
@@ -306,7 +306,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         let [width, height] = iteration.scene.film_size;
         let rows = (0..height.div_ceil(BLOCK_SIDE)).into_par_iter();
         rows.map_init(
-            || ThreadScratch::new(self.probe_stride),
+            || ThreadScratch::new(self.probe_stride, self.mis.heuristic),
             |scratch, row| self.outside_splats(iteration, [0, row * BLOCK_SIDE, width, BLOCK_SIDE], scratch),
         )
         .collect()
@@ -426,7 +426,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         }
         self.begin(iteration);
         self.prepare_replay(iteration);
-        let (mut scratch, mut tracer) = (ThreadScratch::new(ProbeStride(None)), iteration.tracer());
+        let (mut scratch, mut tracer) = (ThreadScratch::new(ProbeStride(None), self.mis.heuristic), iteration.tracer());
         let mut replay = Replay { pixel, ..Replay::default() };
         let mut visible = self.replay_light_path(iteration, &mut scratch, &mut tracer, &mut replay);
         if self.mis.techniques.uses_eye_paths() {

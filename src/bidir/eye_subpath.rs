@@ -17,7 +17,7 @@ use crate::mis::{
     MisWeight, PathEnd, ReversePath, VertexPdfs, next_event_factor,
 };
 use crate::path::{DirectionSampler, Edge, Iteration, Origin, Scattering, Vertex, WalkHooks, direct_segment};
-use crate::ray::{Tracer, Work};
+use crate::ray::{Segment, Tracer, Work};
 use crate::shade::{BsdfSample, Transport};
 
 /// c's knowledge about an edge, by strategy.
@@ -97,15 +97,18 @@ struct DirectConnection<'a> {
 }
 
 impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
-    /// A contribution of the technique (s, t), written down if there is a replay.
+    /// A contribution of the technique (s, t), with its value and weight as if all light passed the masks on its
+    /// connection, `segment`; written down if there is a replay.
     pub(super) fn contribution(
         &mut self,
         (s, t): (usize, usize),
         origin: PathOrigin,
-        raw: Rgb,
-        weight: MisWeight,
+        (raw, weight): (Rgb, MisWeight),
+        segment: Option<&Segment>,
     ) -> Contribution {
         let (pixel, lens, rules) = (self.pixel, self.lens, self.rules);
+        let open =
+            Contribution { x: pixel.0, y: pixel.1, path: 0, replay_index: 0, s: s as u16, t: t as u16, raw, weight };
         let replay_index = self.replay.as_mut().map_or(0, |replay| {
             // z_1 … z_{t−1}, of which the last is the light's vertex if the walk hit it.
             let eye_vertices = if s == 0 { t - 2 } else { t - 1 };
@@ -116,10 +119,10 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
             let path = origin.map(|origin| replay.path(origin, s, eye_vertices, lens));
             let scene = rules.iteration.scene;
             let factor = |v: &AdjacentVertices| factor_of(scene, rules.strategy, rules.mis, v);
-            let record = ContributionRecord::new((s, t), pixel, raw, weight.own);
+            let record = ContributionRecord::of(&open, segment, scene, rules.mis.heuristic);
             replay.contribution(scene, rules.mis, &factor, record, path)
         });
-        Contribution { x: pixel.0, y: pixel.1, path: 0, replay_index, s: s as u16, t: t as u16, raw, weight }
+        Contribution { replay_index, ..open }
     }
 
     /// (0, t): the walk met a light. The vertex on the light is the last of the sub-path.
@@ -160,8 +163,21 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
             // No connection ends at the light.
             reverse: self.reverse_path(t, EdgeOf::<S>::default(), origin.throughput, Rgb::BLACK),
         });
-        let contribution = self.contribution((0, t), PathOrigin::Known(Some(origin)), throughput * emitted, weight);
+        let contribution =
+            self.contribution((0, t), PathOrigin::Known(Some(origin)), (throughput * emitted, weight), None);
         self.sink.add(ContributionKind::Hit, contribution);
+    }
+
+    /// (0, t) if `vertex`, the last of the sub-path, is on a surface that emits.
+    fn emission(&mut self, vertex: &Vertex) {
+        let scene = self.rules.iteration.scene;
+        if let Some((light, emitted)) = emitted_at(scene, vertex)
+            && let crate::path::Place::Surface { point, .. } = vertex.place
+        {
+            let end = scene.lights.get(light).end_at(point.p, point.error, point.ng);
+            let (direction, throughput) = (-vertex.wo, vertex.throughput);
+            self.hit(&EmitterHit { light, end, direction, throughput, emitted, edge: vertex.edge });
+        }
     }
 
     /// (1, t): a point of a light, drawn as seen from the eye vertex.
@@ -204,10 +220,11 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         );
         tracer.end(Work::Weights, started);
         let segment = direct_segment(&vertex.place.segment_end(), sample);
-        let contribution = self.contribution((1, t), PathOrigin::Known(Some(origin)), raw, weight);
-        let sink = &mut *self.sink;
+        let origin = PathOrigin::Known(Some(origin));
+        let contribution = self.contribution((1, t), origin, (raw, weight), Some(&segment));
+        let (sink, heuristic) = (&mut *self.sink, self.rules.mis.heuristic);
         self.queues.next_event.push(&segment, contribution, tracer, |c, transmittance| {
-            sink.add(ContributionKind::NextEvent, c.attenuated(transmittance));
+            sink.add(ContributionKind::NextEvent, c.through(transmittance, heuristic));
         });
     }
 
@@ -299,13 +316,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> WalkHooks for EyeHooks<'_, S, K
         if let Some(replay) = &mut self.replay {
             replay.vertex(SubpathKind::Eye, scene, vertex);
         }
-        if let Some((light, emitted)) = emitted_at(scene, vertex)
-            && let crate::path::Place::Surface { point, .. } = vertex.place
-        {
-            let end = scene.lights.get(light).end_at(point.p, point.error, point.ng);
-            let (direction, throughput) = (-vertex.wo, vertex.throughput);
-            self.hit(&EmitterHit { light, end, direction, throughput, emitted, edge: vertex.edge });
-        }
+        self.emission(vertex);
         let normal = light_choice_normal(scene, vertex);
         self.normal_before = normal;
         if vertex.scatter.is_black() {
@@ -321,6 +332,13 @@ impl<S: ConnectionStrategy, K: ContributionSink> WalkHooks for EyeHooks<'_, S, K
             self.connections(vertex, tracer, sampler);
         }
         (vertex.index as usize + 1) < rules.max_eye_vertices
+    }
+
+    fn passing(&mut self, vertex: &Vertex) {
+        // The emission is the end of a path, and no part of those that go on.
+        self.pdfs.arrive(vertex, 1.0);
+        self.emission(vertex);
+        self.pdfs.forget_arrival();
     }
 
     fn leaving(&mut self, vertex: &Vertex, sample: &BsdfSample) {

@@ -46,22 +46,24 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
             return;
         }
         let raw = *raw * filter;
-        let replay_index = self.record(*s, lens, ContributionRecord::new((*s, 1), (x, y), raw, weight.own));
         let path = self.purpose.number;
-        let splat = Contribution { x, y, path, replay_index, s: *s as u16, t: 1, raw, weight: *weight };
+        let mut splat = Contribution { x, y, path, replay_index: 0, s: *s as u16, t: 1, raw, weight: *weight };
+        splat.replay_index = self.record(lens, segment, &splat);
         let Some(splats) = &mut self.purpose.splats else { return };
         splats.push(segment, splat, tracer);
     }
 
     /// Writes a contribution down in a replay; returns its number there.
-    fn record(&mut self, s: usize, lens: &LensSample, contribution: ContributionRecord) -> u32 {
+    fn record(&mut self, lens: &LensSample, segment: &Segment, splat: &Contribution) -> u32 {
         let Some(replay) = &mut self.purpose.replay else { return 0 };
+        let s = usize::from(splat.s);
         // The edge that leaves the light is the connection itself if there is no other.
         let direction = if s == 1 && self.emission.ng.is_some() { lens.wi } else { self.emission.direction };
         let path = self.out.origin.map(|origin| replay.path(Origin { direction, ..origin }, s, 0, lens.p));
         let (scene, mis) = (self.rules.scene, self.rules.mis);
         let factor = |v: &AdjacentVertices| factor_of(scene, self.rules.strategy, mis, v);
-        replay.contribution(scene, mis, &factor, contribution, path)
+        let record = ContributionRecord::of(splat, Some(segment), scene, mis.heuristic);
+        replay.contribution(scene, mis, &factor, record, path)
     }
 
     /// (s, t) = (1, 1): the light itself as the lens sees it.

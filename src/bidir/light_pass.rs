@@ -86,7 +86,11 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         let (pieces, kept_pieces) = (all.div_ceil(CHUNK), kept.div_ceil(CHUNK));
         let kept_chunks = store.begin(kept_pieces).par_iter_mut().map(Some);
         let others = (kept_pieces..pieces).into_par_iter().map(|_| None);
-        kept_chunks.chain(others).enumerate().map_init(|| ThreadScratch::new(self.probe_stride), trace).collect()
+        kept_chunks
+            .chain(others)
+            .enumerate()
+            .map_init(|| ThreadScratch::new(self.probe_stride, self.mis.heuristic), trace)
+            .collect()
     }
 
     /// Traces the light sub-paths in a row of blocks whose home pixels are outside of the window: only their splats

@@ -180,13 +180,13 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
             let cos = vertex.place.cosine(vertex.wo);
             let pdf_fwd = emission.end.pdf_next_vertex(emission.pdf_position, emission.pdf_direction, cos, dist2);
             let to_light = emission.end.area_jacobian(emission.direction, dist2);
-            self.out.pdfs.arrive_with(pdf_fwd, to_light, eye_survival);
+            self.out.pdfs.arrive_with(vertex.edge, pdf_fwd, to_light, eye_survival);
             self.out.emitter.next_event = self.next_event_factor(vertex, to_light);
         } else {
             let pdf_fwd = self.out.pdfs.arrive(vertex, eye_survival);
             let factor = self.connection_factor(vertex, pdf_fwd, tracer);
             if let Some(last) = self.out.pdfs.last_mut() {
-                last.connection_factor = factor;
+                last.connection_factor *= factor;
             }
         }
     }

@@ -1,11 +1,13 @@
 //! One sample, run again and written down: explains a firefly or a value that is not finite.
 
+use super::contribution::Contribution;
 use super::endpoint::light_choice_normal;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use crate::mis::oracle::FactorOf;
-use crate::mis::{ConnectionFactor, MisContext, PathPdfs};
+use crate::mis::{ConnectionFactor, Heuristic, MisContext, PathPdfs};
 use crate::path::{FullPath, Interior, Origin, Place, Vertex};
 use crate::prepared::PreparedScene;
+use crate::ray::{Segment, Transmittance};
 use crate::shade::BsdfSample;
 
 /// All that happened in one sample of one pixel.
@@ -72,6 +74,20 @@ impl ContributionRecord {
     /// A contribution of the technique (s, t), not yet known to be visible.
     pub fn new((s, t): (usize, usize), pixel: (u32, u32), raw: Rgb, weight: f32) -> ContributionRecord {
         ContributionRecord { s, t, pixel, raw, weight, visible: false, path: None, techniques: vec![] }
+    }
+
+    /// A contribution that is not yet known to be visible, seen through the masks on the connection `segment` if it has
+    /// one.
+    pub fn of(
+        contribution: &Contribution,
+        segment: Option<&Segment>,
+        scene: &PreparedScene,
+        heuristic: Heuristic,
+    ) -> ContributionRecord {
+        let transmittance = segment.map_or(Transmittance::ONE, |segment| scene.tracer().transmittance(segment));
+        let seen = if transmittance.is_zero() { *contribution } else { contribution.through(transmittance, heuristic) };
+        let technique = (usize::from(seen.s), usize::from(seen.t));
+        ContributionRecord::new(technique, (seen.x, seen.y), seen.raw, seen.weight.own)
     }
 }
 

@@ -3,8 +3,8 @@
 use super::contribution::{Contribution, ContributionKind};
 use super::light_subpath::LightSubpath;
 use crate::film::{FilmTile, SampleBuffer, Splat};
-use crate::mis::{ConnectionFactor, EyeSubpathPdfs};
-use crate::path::{ShadowQueue, Transmittance};
+use crate::mis::{ConnectionFactor, EyeSubpathPdfs, Heuristic};
+use crate::path::ShadowQueue;
 use crate::ray::{RayKind, RayStats, Tracer};
 
 /// Which sub-paths are probed: their contributions are also kept one by one.
@@ -27,23 +27,24 @@ pub struct SplatQueue {
     /// Visible splats of probed light sub-paths.
     probed: Vec<Contribution>,
     stride: ProbeStride,
+    heuristic: Heuristic,
 }
 
 impl SplatQueue {
-    fn new(stride: ProbeStride) -> SplatQueue {
-        SplatQueue { queue: ShadowQueue::new(RayKind::ShadowLens), splats: vec![], probed: vec![], stride }
+    fn new(stride: ProbeStride, heuristic: Heuristic) -> SplatQueue {
+        SplatQueue { queue: ShadowQueue::new(RayKind::ShadowLens), splats: vec![], probed: vec![], stride, heuristic }
     }
 
     /// Queues a splat, which arrives if nothing blocks `segment`.
     pub fn push(&mut self, segment: &crate::ray::Segment, splat: Contribution, tracer: &mut Tracer) {
-        let SplatQueue { queue, splats, probed, stride } = self;
-        queue.push(segment, splat, tracer, |c, t| Self::arrive(splats, probed, *stride, c, t));
+        let SplatQueue { queue, splats, probed, stride, heuristic } = self;
+        queue.push(segment, splat, tracer, |c, t| Self::arrive(splats, probed, *stride, c.through(t, *heuristic)));
     }
 
     /// Sends off the queued rays.
     pub fn flush(&mut self, tracer: &mut Tracer) {
-        let SplatQueue { queue, splats, probed, stride } = self;
-        queue.flush(tracer, |c, t| Self::arrive(splats, probed, *stride, c, t));
+        let SplatQueue { queue, splats, probed, stride, heuristic } = self;
+        queue.flush(tracer, |c, t| Self::arrive(splats, probed, *stride, c.through(t, *heuristic)));
     }
 
     fn arrive(
@@ -51,9 +52,7 @@ impl SplatQueue {
         probed: &mut Vec<Contribution>,
         stride: ProbeStride,
         contribution: Contribution,
-        transmittance: Transmittance,
     ) {
-        let contribution = contribution.attenuated(transmittance);
         splats.push(contribution.splat());
         if stride.probes(contribution.path) {
             probed.push(contribution);
@@ -67,13 +66,15 @@ pub struct EyeQueues {
     pub next_event: ShadowQueue<Contribution>,
     /// Connections to light sub-paths.
     pub connection: ShadowQueue<Contribution>,
+    heuristic: Heuristic,
 }
 
 impl EyeQueues {
     /// Sends off the queued rays.
     pub fn flush(&mut self, tracer: &mut Tracer, sink: &mut impl ContributionSink) {
-        self.next_event.flush(tracer, |c, t| sink.add(ContributionKind::NextEvent, c.attenuated(t)));
-        self.connection.flush(tracer, |c, t| sink.add(ContributionKind::Connection, c.attenuated(t)));
+        let heuristic = self.heuristic;
+        self.next_event.flush(tracer, |c, t| sink.add(ContributionKind::NextEvent, c.through(t, heuristic)));
+        self.connection.flush(tracer, |c, t| sink.add(ContributionKind::Connection, c.through(t, heuristic)));
     }
 }
 
@@ -101,16 +102,17 @@ pub struct TileOutput {
 }
 
 impl<F: ConnectionFactor> ThreadScratch<F> {
-    /// Empty memory of a thread that probes sub-paths by `stride`.
-    pub fn new(stride: ProbeStride) -> ThreadScratch<F> {
+    /// Empty memory of a thread that probes sub-paths by `stride`, for weights by `heuristic`.
+    pub fn new(stride: ProbeStride, heuristic: Heuristic) -> ThreadScratch<F> {
         ThreadScratch {
             light: LightSubpath::default(),
             eye: EyeSubpathPdfs::default(),
             queues: EyeQueues {
                 next_event: ShadowQueue::new(RayKind::ShadowDirect),
                 connection: ShadowQueue::new(RayKind::ShadowConnection),
+                heuristic,
             },
-            splats: SplatQueue::new(stride),
+            splats: SplatQueue::new(stride, heuristic),
         }
     }
 

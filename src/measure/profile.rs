@@ -266,7 +266,7 @@ impl RayQuery for NoBackend {
     fn describe(&self) -> String {
         "no backend".into()
     }
-    fn closest(&self, _: &crate::ray::Ray) -> Option<crate::ray::Hit> {
+    fn closest_of(&self, _: &crate::ray::Ray, _: crate::ray::SurfaceMask) -> Option<crate::ray::Hit> {
         None
     }
     fn occluded(&self, _: &crate::ray::Ray, _: crate::ray::SurfaceMask) -> bool {

@@ -20,7 +20,7 @@ struct Log {
 
 #[derive(Clone, Copy)]
 enum QueryKind {
-    Closest,
+    Closest(SurfaceMask),
     Occluded(SurfaceMask),
     Packet,
 }
@@ -49,8 +49,8 @@ impl RayQuery for Arc<dyn RayQuery> {
         (**self).as_embree()
     }
 
-    fn closest(&self, ray: &Ray) -> Option<Hit> {
-        (**self).closest(ray)
+    fn closest_of(&self, ray: &Ray, surfaces: SurfaceMask) -> Option<Hit> {
+        (**self).closest_of(ray, surfaces)
     }
 
     fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
@@ -89,12 +89,12 @@ impl RayQuery for Recorder {
         self.inner.describe()
     }
 
-    fn closest(&self, ray: &Ray) -> Option<Hit> {
+    fn closest_of(&self, ray: &Ray, surfaces: SurfaceMask) -> Option<Hit> {
         self.keep(1, |log| {
-            log.order.push(QueryKind::Closest);
+            log.order.push(QueryKind::Closest(surfaces));
             log.rays.push(*ray);
         });
-        self.inner.closest(ray)
+        self.inner.closest_of(ray, surfaces)
     }
 
     fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
@@ -142,7 +142,9 @@ impl Recording {
             for kind in &log.order {
                 met += match kind {
                     QueryKind::Packet => packets.next().map_or(0, |p| query.occluded_packet(p).0.count_ones().into()),
-                    QueryKind::Closest => rays.next().map_or(0, |r| u64::from(query.closest(r).is_some())),
+                    QueryKind::Closest(surfaces) => {
+                        rays.next().map_or(0, |r| u64::from(query.closest_of(r, *surfaces).is_some()))
+                    }
                     QueryKind::Occluded(blockers) => rays.next().map_or(0, |r| u64::from(query.occluded(r, *blockers))),
                 };
             }

@@ -59,6 +59,7 @@ pub use weight::{
 };
 
 use crate::math::SolidAnglePdf;
+use crate::ray::Transmittance;
 
 /// The exponent of the heuristic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +85,17 @@ impl Heuristic {
     #[inline]
     pub fn weight(self, own: SolidAnglePdf, other: SolidAnglePdf) -> f32 {
         1.0 / (1.0 + self.power(other.0 / own.0)) // [Veach eq. 9.8]
+    }
+
+    /// Weight of a technique that connects two vertices by an edge of this transmittance, from its weight `open` where
+    /// the transmittance is one. All other techniques make the edge by a walk, so that their densities have the
+    /// transmittance as a factor (see `ray::transmittance`).
+    #[inline]
+    pub fn weight_through(self, open: f32, transmittance: Transmittance) -> f32 {
+        if transmittance.is_one() {
+            return open;
+        }
+        open / (open + (1.0 - open) * self.power(transmittance.share()))
     }
 }
 

@@ -8,14 +8,16 @@ use crate::math::measure::area_jacobian;
 use crate::math::{Rgb, Vec3};
 use crate::path::{DirectionSampler, FullPath, Interior};
 use crate::prepared::PreparedScene;
+use crate::ray::Segment;
+use crate::ray::offset::{SegmentEnd, segment};
 use crate::shade::Transport;
 
 /// Densities of the vertices v_0 … v_k of a path.
 #[derive(Clone, Debug)]
 pub struct PathPdfs {
-    /// p_L(v_i), from the light's end, survival of roulette included, for i < k.
+    /// p_L(v_i), from the light's end, survival of roulette included, for i < k, without the masks on the way.
     pub light: Vec<f64>,
-    /// p_E(v_i), from the lens's end.
+    /// p_E(v_i), from the lens's end; as `light`.
     pub eye: Vec<f64>,
     /// Whether the edge v_{i−1} v_i can be a connection, for i = 1 … k; and for i = 0, whether a ray can meet the light
     /// by chance.
@@ -24,6 +26,9 @@ pub struct PathPdfs {
     pub next_event: f64,
     /// c_s of connections with s ≥ 2 and t ≥ 2, see `mis::factor`; 1 elsewhere.
     pub connection_factors: Vec<f64>,
+    /// τ of the edge v_{i−1} v_i, for i = 1 … k, and 1 for i = 0; 1 also where no light passes, since no technique makes
+    /// such a path.
+    pub transmittances: Vec<f64>,
 }
 
 /// Two neighbouring vertices of a path, of which the first could have been the last of a resampled light sub-path, and
@@ -132,6 +137,27 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         })
     }
 
+    /// τ of every edge, by the number of the vertex at its end; see [`PathPdfs::transmittances`].
+    fn transmittances(&self) -> Vec<f64> {
+        let (path, k, mut tracer) = (self.path, self.path.edges(), self.scene.tracer());
+        let end = |i: usize| match i {
+            0 => path.origin.end.segment_end(),
+            _ => Some(path.interior.get(i - 1).map_or(SegmentEnd::Free(path.lens), |v| v.place().segment_end())),
+        };
+        let edge = |i: usize| match (end(i), end(i - 1)) {
+            (Some(from), Some(to)) => Some(segment(&from, &to)),
+            (Some(from), None) => {
+                let d = -path.origin.direction;
+                Some(Segment::to_infinity(from.leaving(d), d))
+            }
+            _ => None,
+        };
+        let share = |edge: Segment| tracer.transmittance(&edge).share();
+        let shares = (1..=k).filter_map(edge).map(share);
+        let passing = |share: f32| if share > 0.0 { f64::from(share) } else { 1.0 };
+        std::iter::once(1.0).chain(shares.map(passing)).collect()
+    }
+
     /// c_s of every connection.
     fn connection_factors(&self, factor_of: FactorOf) -> Vec<f64> {
         let (path, k) = (self.path, self.path.edges());
@@ -184,16 +210,19 @@ impl PathPdfs {
             eye: view.eye_pdfs(),
             connectable: (0..=k).map(|i| if i == 0 { can_be_hit } else { smooth(i - 1) && smooth(i) }).collect(),
             connection_factors: view.connection_factors(factor_of),
+            transmittances: view.transmittances(),
         }
     }
 
-    /// ln of n_s c_s p_s for every technique (s, k + 1 − s), s = 0 … k; −∞ for those that cannot make the path.
+    /// ln of n_s c_s p_s for every technique (s, k + 1 − s), s = 0 … k, over the transmittance of the whole path; −∞ for those that cannot make the path.
     pub fn log_effective_pdfs<F>(&self, mis: &MisContext<F>) -> Vec<f64> {
         let k = self.eye.len() - 1;
         (0..=k)
             .map(|s| {
                 let n = f64::from(mis.techniques.count(s, k + 1 - s));
-                let c = if s == 1 && k >= 2 { self.next_event } else { self.connection_factors[s] };
+                // Every technique walks the edges but its own connection.
+                let connected = if s == 0 { 1.0 } else { 1.0 / self.transmittances[s] };
+                let c = if s == 1 && k >= 2 { self.next_event } else { self.connection_factors[s] } * connected;
                 let possible = if self.connectable[s] { 1.0 } else { 0.0 };
                 let light: f64 = self.light[..s].iter().map(|p| p.ln()).sum();
                 // p_E(v_0) of a light that cannot be hit belongs to an impossible technique alone.

@@ -5,6 +5,10 @@
 //! density with which a walk from the *other* end would have made it. Products of such ratios lead from a technique to
 //! its neighbours, so nothing else is ever multiplied up.
 //!
+//! The holes of masks that a walk passes on its way to a vertex are part of its density from either end. So they are no
+//! part of the ratio, and are left out of p_fwd as well: among the techniques of a path they tell only the one that
+//! connects the vertex with the vertex before from the others, which walk ([`VertexPdfs::connection_factor`]).
+//!
 //! Densities of a vertex at infinity are per steradian of its direction; the disk that emission rays start on stands in
 //! for the direction's density at the next vertex (see `emit::sample`). [`VertexPdfs::area_jacobian`] hides the
 //! difference.
@@ -13,6 +17,7 @@ use super::factor::ConnectionFactor;
 use crate::math::measure::area_jacobian;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::{DirectionSampler, Edge, Vertex};
+use crate::ray::Transmittance;
 use crate::shade::{BsdfSample, Transport};
 
 /// Densities of a vertex of a sub-path.
@@ -34,7 +39,8 @@ pub struct VertexPdfs {
     /// Both directions of the path at this vertex have a density (no delta event), so that the edges beside it can be
     /// connections. Valid once the walk has left it.
     pub connectable: bool,
-    /// Light sub-paths: c of the connection that ends at this vertex (see [`ConnectionFactor`]).
+    /// Factor of the technique that connects this vertex with the vertex before: 1/τ of the edge (see
+    /// `ray::transmittance`), in light sub-paths times c of the connection (see [`ConnectionFactor`]).
     pub connection_factor: f32,
     /// Partial sums of effective densities: the techniques that use no vertices of this sub-path but those before this
     /// one (see [`MisContext::accumulate_partial_sums`](super::MisContext::accumulate_partial_sums)). Valid once the
@@ -43,21 +49,21 @@ pub struct VertexPdfs {
 }
 
 impl VertexPdfs {
-    fn new(pdf_fwd: AreaPdf, area_jacobian: f32, survival: f32) -> VertexPdfs {
+    fn new(transmittance: Transmittance, pdf_fwd: AreaPdf, area_jacobian: f32, survival: f32) -> VertexPdfs {
         VertexPdfs {
             pdf_fwd,
             area_jacobian,
             survival,
             rev_over_fwd: 0.0,
             connectable: true,
-            connection_factor: 1.0,
+            connection_factor: 1.0 / transmittance.share(),
             partial_sums: [0.0; 2],
         }
     }
 
     /// The origin of a sub-path.
     pub fn origin(pdf_fwd: AreaPdf) -> VertexPdfs {
-        VertexPdfs::new(pdf_fwd, 0.0, 1.0)
+        VertexPdfs::new(Transmittance::ONE, pdf_fwd, 0.0, 1.0)
     }
 }
 
@@ -84,20 +90,25 @@ impl SubpathPdfs {
         let (edge, cos) = (vertex.edge, vertex.place.cosine(vertex.wo));
         let distance2 = edge.distance * edge.distance;
         let pdf_fwd = edge.pdf_with_survival().to_area(cos, distance2);
-        self.vertices.push(VertexPdfs::new(pdf_fwd, area_jacobian(self.cos_leaving, distance2), survival));
+        self.arrive_with(edge, pdf_fwd, area_jacobian(self.cos_leaving, distance2), survival);
         pdf_fwd
     }
 
     /// The walk left the scene. A vertex at infinity has a density per steradian, and only the tilt of the vertex
     /// before spreads the disk that emission from there starts on.
     pub fn arrive_at_infinity(&mut self, edge: &Edge) {
-        self.arrive_with(AreaPdf(edge.pdf_with_survival().0), self.cos_leaving.abs(), 1.0);
+        self.arrive_with(edge, AreaPdf(edge.pdf_with_survival().0), self.cos_leaving.abs(), 1.0);
     }
 
-    /// The walk arrived at its next vertex, with densities that its emitter knows.
+    /// The walk arrived at its next vertex by `edge`, with densities that its emitter knows.
     #[inline]
-    pub fn arrive_with(&mut self, pdf_fwd: AreaPdf, area_jacobian: f32, survival: f32) {
-        self.vertices.push(VertexPdfs::new(pdf_fwd, area_jacobian, survival));
+    pub fn arrive_with(&mut self, edge: &Edge, pdf_fwd: AreaPdf, area_jacobian: f32, survival: f32) {
+        self.vertices.push(VertexPdfs::new(edge.transmittance, pdf_fwd, area_jacobian, survival));
+    }
+
+    /// Takes back the last arrival.
+    pub fn forget_arrival(&mut self) {
+        self.vertices.pop();
     }
 
     /// The walk leaves its last vertex, `vertex`, by `sample`; `reverse_mode` is the transport mode of a walk from the
@@ -207,6 +218,13 @@ impl<F: ConnectionFactor> EyeSubpathPdfs<F> {
     pub fn arrive(&mut self, vertex: &Vertex, survival: f32) {
         self.pdfs.arrive(vertex, survival);
         self.push(vertex.place.cosine(vertex.wo).abs(), vertex.edge.distance * vertex.edge.distance);
+    }
+
+    /// Takes back the last arrival.
+    pub fn forget_arrival(&mut self) {
+        self.pdfs.forget_arrival();
+        self.reverse.pop();
+        self.edges.pop();
     }
 
     /// The walk left the scene; see [`SubpathPdfs::arrive_at_infinity`].

@@ -15,12 +15,18 @@
 //! those techniques draw their light point as seen from v_1 (*next event*) and not as light sub-paths do; c of
 //! connections is a [`ConnectionFactor`]; all others are 1, or 0 if an end of the connection is a delta event. Roulette
 //! is part of the densities: its first vertex is counted from the end that walks.
+//!
+//! Masks: a walk makes an edge with a density that has the edge's transmittance τ as a factor, a connection does not
+//! (`ray::transmittance`). All techniques of a path walk all of its edges but their own connection: c has the factor
+//! 1/τ of that edge, and s = 0, which has none, no such factor. The edges of sub-paths know it; that of the connection
+//! itself is found only after the weight, which [`MisWeight::through`] then corrects.
 
 use super::factor::{ConnectionFactor, IncidentSubpath, ResamplingTarget};
 use super::pdfs::{ReverseTransport, VertexPdfs};
 use super::{Heuristic, Techniques};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::{PathLimits, ScatterSampler};
+use crate::ray::Transmittance;
 
 /// Densities with which the walk from the other end would have made the last two vertices of a sub-path.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +86,7 @@ pub struct ConnectedPath<'a, F: ConnectionFactor> {
     pub eye_end: EndpointPdfs,
     /// c_0 and c_1.
     pub emitter: EmitterFactors,
-    /// c of this connection, if s ≥ 2 and t ≥ 2; else 1.
+    /// c of this connection, if s ≥ 2 and t ≥ 2, else 1; over the transmittance of its edge, where that is known.
     pub connection_factor: f32,
     /// Arguments of the factors of connections along the eye sub-path.
     pub reverse: ReversePath<'a, F>,
@@ -123,6 +129,24 @@ pub struct MisWeight {
     pub connections: f32,
 }
 
+impl MisWeight {
+    /// Weights of a path that the technique (s, t) has made by a connection of this transmittance, from those where it
+    /// is one: the densities of all other techniques have it as a factor.
+    pub fn through(self, transmittance: Transmittance, heuristic: Heuristic, (s, t): (usize, usize)) -> MisWeight {
+        let power = heuristic.power(transmittance.share());
+        let scale = 1.0 / (self.own + (1.0 - self.own) * power);
+        let of = |of_group: f32, own: bool| match own {
+            true => (self.own + (of_group - self.own) * power) * scale,
+            false => of_group * power * scale,
+        };
+        MisWeight {
+            own: self.own * scale,
+            light_image: of(self.light_image, group(s, t) == LIGHT_IMAGE),
+            connections: of(self.connections, group(s, t) == CONNECTIONS),
+        }
+    }
+}
+
 /// Sums of effective densities by group of techniques.
 const GROUPS: usize = 3;
 const OTHERS: usize = 0;
@@ -146,15 +170,15 @@ struct Term {
 }
 
 impl<F: ConnectionFactor> MisContext<F> {
-    /// n_s c_s, connectability apart; `connection_factor` is c where s ≥ 2 and t ≥ 2.
+    /// n_s c_s, connectability apart; `connection_factor` is 1/τ of the connection, times c where s ≥ 2 and t ≥ 2.
     #[inline]
     fn effective_count(&self, s: usize, t: usize, emitter: EmitterFactors, connection_factor: f32) -> f32 {
         let n = self.techniques.count(s, t);
         match s {
             0 if !emitter.can_be_hit => 0.0,
-            1 if t >= 2 => n * emitter.next_event,
-            _ if s >= 2 && t >= 2 => n * connection_factor,
-            _ => n,
+            0 => n,
+            1 if t >= 2 => n * emitter.next_event * connection_factor,
+            _ => n * connection_factor,
         }
     }
 
@@ -302,6 +326,7 @@ impl<F: ConnectionFactor> MisContext<F> {
         let mut throughput = path.reverse.throughput;
         self.add_outward(path.eye, &path.eye_end, s, partial(false, LIGHT_IMAGE), &mut sums, |n| {
             let factor = if F::IS_ONE { 1.0 } else { self.eye_factor(path, n, &mut throughput) };
+            let factor = factor * path.eye[n].connection_factor;
             let effective_count = self.effective_count(vertices - n, n, path.emitter, factor);
             Term { effective_count, group: group(vertices - n, n) }
         });

@@ -32,7 +32,7 @@ impl<'a> Iteration<'a> {
     /// A tracer of rays through the scene at the iteration's time, with empty counters.
     #[inline]
     pub fn tracer(&self) -> Tracer<'a> {
-        Tracer::new(&*self.scene.query)
+        self.scene.tracer()
     }
 
     /// Number of the pixel (x, y) in the full picture, row by row.

@@ -5,6 +5,7 @@
 pub mod directions;
 pub mod full;
 pub mod iteration;
+pub mod passage;
 pub mod roulette;
 pub mod streams;
 pub mod vertex;
@@ -14,7 +15,8 @@ pub mod walk;
 pub use directions::{DirectionSampler, ScatterSampler};
 pub use full::{FullPath, Interior, Origin};
 pub use iteration::Iteration;
+pub use passage::first_seen;
 pub use roulette::PathLimits;
 pub use vertex::{Edge, Place, Scatter, Scattering, StoredPlace, Vertex};
-pub use visibility::{ShadowQueue, Transmittance, direct_segment};
+pub use visibility::{ShadowQueue, direct_segment};
 pub use walk::{CameraStart, WalkHooks, WalkRules, WalkStart, walk};

@@ -2,8 +2,8 @@
 
 use crate::math::measure::area_jacobian;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
-use crate::ray::Hit;
 use crate::ray::offset::SegmentEnd;
+use crate::ray::{Hit, Transmittance};
 use crate::shade::{Bsdf, BsdfSample, BsdfView, MediumPoint, Phase, SurfacePoint, Transport};
 
 /// How a vertex was reached.
@@ -19,10 +19,21 @@ pub struct Edge {
     pub survival: f32,
     /// Length.
     pub distance: f32,
+    /// τ: the share of light that passes the masks on the edge, which is the probability with which the walk has passed
+    /// them.
+    pub transmittance: Transmittance,
 }
 
 impl Edge {
-    /// Density per steradian of the direction, survival of Russian roulette included.
+    /// An edge from `from` in a direction of the density `pdf`, not from a delta lobe and without Russian roulette,
+    /// whose end is not yet known.
+    #[inline]
+    pub fn new(from: Vec3, pdf: SolidAnglePdf) -> Edge {
+        let (distance, transmittance) = (f32::INFINITY, Transmittance::ONE);
+        Edge { from, pdf, delta: false, survival: 1.0, distance, transmittance }
+    }
+
+    /// Density per steradian of the direction, survival of Russian roulette included, without the masks on the way.
     #[inline]
     pub fn pdf_with_survival(&self) -> SolidAnglePdf {
         SolidAnglePdf(self.pdf.0 * self.survival)

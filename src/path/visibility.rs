@@ -4,32 +4,8 @@
 //! order they came, so sums do not depend on how packets were filled.
 
 use crate::emit::DirectSample;
-use crate::math::Rgb;
 use crate::ray::offset::{SegmentEnd, segment};
-use crate::ray::{PACKET, RayKind, Segment, SegmentPacket, Tracer};
-use std::ops::Mul;
-
-/// The share of light that passes a segment, by which a contribution is multiplied on arrival.
-///
-/// Without media and partly transparent surfaces a segment that nothing blocks lets all light pass. That is the only
-/// value today: the type is empty, and multiplying by it costs nothing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Transmittance(());
-
-impl Transmittance {
-    /// All light passes.
-    pub const ONE: Transmittance = Transmittance(());
-}
-
-impl Mul<Transmittance> for Rgb {
-    type Output = Rgb;
-
-    #[inline]
-    fn mul(self, _: Transmittance) -> Rgb {
-        self
-    }
-}
-
+use crate::ray::{PACKET, RayKind, Segment, SegmentPacket, Tracer, Transmittance};
 /// The segment from the place `from` to a sampled point of a light.
 #[inline]
 pub fn direct_segment(from: &SegmentEnd, light: &DirectSample) -> Segment {
@@ -53,7 +29,7 @@ impl<T: Copy + Default> ShadowQueue<T> {
     }
 
     /// Queues a segment with its payload; sends the packet off when it is full. `arrived` gets the payloads of segments
-    /// that nothing blocks, with the transmittance of the segment.
+    /// that some light passes, with the transmittance of the segment.
     #[inline]
     pub fn push(&mut self, segment: &Segment, payload: T, tracer: &mut Tracer, arrived: impl FnMut(T, Transmittance)) {
         self.payloads[self.packet.len] = payload;
@@ -71,7 +47,10 @@ impl<T: Copy + Default> ShadowQueue<T> {
         let blocked = tracer.occluded_packet(&self.packet, self.kind);
         for (i, &payload) in self.payloads[..self.packet.len].iter().enumerate() {
             if blocked >> i & 1 == 0 {
-                arrived(payload, Transmittance::ONE);
+                let transmittance = tracer.transmittance(&self.packet.get(i));
+                if !transmittance.is_zero() {
+                    arrived(payload, transmittance);
+                }
             }
         }
         self.packet.len = 0;

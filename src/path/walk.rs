@@ -1,16 +1,17 @@
 //! The random walk: the only bounce loop of the program.
 //!
-//! From an origin it traces, resolves the vertex, shows it to the hooks, draws the next direction from the direction
-//! sampler and plays Russian roulette, until a limit, a miss or a hook ends it. [`Transport`] says whether it carries
-//! radiance or importance.
+//! From an origin it traces, goes straight on through the holes of masks (`passage`), resolves the vertex, shows it to
+//! the hooks, draws the next direction from the direction sampler and plays Russian roulette, until a limit, a miss or a
+//! hook ends it. [`Transport`] says whether it carries radiance or importance.
 
 use super::directions::DirectionSampler;
 use super::iteration::Iteration;
+use super::passage::Passage;
 use super::roulette::PathLimits;
 use super::vertex::{Edge, Place, Scatter, Vertex};
 use crate::math::sampler::{PathSampler, SampleSlot};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
-use crate::prepared::PreparedScene;
+use crate::prepared::{Features, PreparedScene};
 use crate::ray::{Ray, RayKind, T_MIN, Tracer, offset::offset_point};
 use crate::shade::{Bsdf, BsdfSample, SurfacePoint, Transport};
 
@@ -69,6 +70,11 @@ pub trait WalkHooks {
     /// A vertex was met. Returns whether to go on.
     fn vertex(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool;
 
+    /// The walk goes straight on through a hole of a surface that emits. The vertex is the one that would be there, with
+    /// a BSDF that scatters nothing.
+    #[inline]
+    fn passing(&mut self, _vertex: &Vertex) {}
+
     /// The walk goes on from the vertex in a drawn direction, roulette survived.
     #[inline]
     fn leaving(&mut self, _vertex: &Vertex, _sample: &BsdfSample) {}
@@ -102,17 +108,28 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
     let WalkStart { ray, mut throughput, pdf, mut kind } = start;
     let WalkRules { limits, mode, directions } = *rules;
     let Ray { mut o, mut d, mut t_min, mut t_max } = ray;
-    let mut edge = Edge { from: o, pdf, delta: false, survival: 1.0, distance: f32::INFINITY };
+    let mut edge = Edge::new(o, pdf);
+    let has_masks = scene.features.contains(Features::MASKS);
     let mut point = SurfacePoint::default();
     let mut bsdf = Bsdf::empty(&point);
     for index in 1..=limits.max_edges {
-        let Some(hit) = tracer.closest(&Ray { o, d, t_min, t_max }, kind) else {
+        let ray = Ray { o, d, t_min, t_max };
+        let Some(mut hit) = tracer.closest(&ray, kind) else {
             hooks.escaped(index, d, throughput, &edge);
             return;
         };
         edge.distance = hit.t;
         let wo = -d;
-        let material = scene.surface_point_into(&hit, &mut point);
+        let mut material = scene.surface_point_into(&hit, &mut point);
+        if has_masks {
+            let mut passage = Passage { scene, ray, edge: &mut edge, hit, point: &mut point };
+            let passed = |passage: &Passage| passage.show_emission(index, throughput, hooks);
+            let Some(met) = passage.go_on(material, kind, tracer, sampler.rng(), passed) else {
+                hooks.escaped(index, d, throughput, &edge);
+                return;
+            };
+            (hit, material) = met;
+        }
         material.resolve_into(&mut bsdf, &point, wo);
         let place = Place::Surface { point: &point, hit: &hit };
         let vertex = Vertex { index, place, scatter: Scatter::Bsdf(&bsdf), wo, throughput, edge: &edge };
@@ -131,7 +148,7 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
             return;
         }
         hooks.leaving(&vertex, &sample);
-        edge = Edge { from: point.p, pdf: sample.pdf, delta: sample.delta, survival, distance: f32::INFINITY };
+        edge = Edge { delta: sample.delta, survival, ..Edge::new(point.p, sample.pdf) };
         (o, d) = (offset_point(point.p, point.error, point.ng, sample.wi), sample.wi);
         (t_min, t_max) = (T_MIN, f32::INFINITY);
         kind = match mode {

@@ -7,7 +7,7 @@ use super::placing::{PlacedScene, centre};
 use super::{Features, MeshShading, PreparedScene, TriangleTable};
 use crate::emit::{Camera, EmitError, Light, LightSet, PixelFilter};
 use crate::math::Vec3;
-use crate::ray::{Backend, QueryError};
+use crate::ray::{Backend, QueryError, SurfaceMask};
 use crate::scene::{Diagnostics, SceneDesc, SensorDesc};
 use crate::shade::{MaterialSet, TextureSet};
 use std::sync::Arc;
@@ -86,8 +86,9 @@ impl PreparedScene {
         let lights = LightSet::new(all_lights(&mut placed, &desc, &textures, Extent { centre, radius })?);
         let PlacedScene { geometry, meshes, instance_normals, .. } = placed;
 
-        let features =
+        let mut features =
             features(&desc, &sensor, &materials, &lights, &meshes, window != [0, 0, film_size[0], film_size[1]]);
+        features.set(Features::MASKS, geometry.has_any_of(SurfaceMask::MASKS));
         let geometry = Arc::new(geometry);
         let start = Instant::now();
         let query = options.backend.build(geometry.clone(), options.threads)?;
@@ -159,7 +160,6 @@ fn features(
     for mesh in meshes {
         let m = materials.get(mesh.material).features();
         f.set(Features::TEXTURES, m.textured);
-        f.set(Features::MASKS, m.passes_through);
         f.set(Features::SPECULAR, m.delta);
         f.set(Features::NEARLY_SPECULAR, m.nearly_specular);
         f.set(Features::SHADING_NORMALS, !mesh.normals.is_empty());

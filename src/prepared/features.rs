@@ -16,7 +16,7 @@ macro_rules! features {
 features! {
     /// Some material looks up a picture or pattern.
     TEXTURES = 0, "textures";
-    /// Some material lets part of the light straight through.
+    /// Some surface lets a share of the light straight through.
     MASKS = 1, "masks";
     /// Some light is a point, a spot or parallel.
     DELTA_LIGHTS = 2, "delta-lights";

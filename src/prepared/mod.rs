@@ -23,7 +23,7 @@ pub use triangles::TriangleTable;
 use crate::emit::{Camera, LightId, LightSet, PixelFilter};
 use crate::math::{DVec3, Frame, Rgb, Vec2, Vec3};
 use crate::ray::round::RoundUv;
-use crate::ray::{Geometry, Hit, NONE, RayQuery, RoundPoint};
+use crate::ray::{Geometry, Hit, MaskLookup, MaskPoint, NONE, RayQuery, RoundPoint, Tracer};
 use crate::shade::{Material, MaterialSet, SurfacePoint};
 use glam::{Affine3A, Mat3A};
 use std::sync::Arc;
@@ -146,9 +146,23 @@ impl PreparedScene {
         point.dpdv = m.transform_vector3(point.dpdv);
     }
 
+    /// A tracer of rays through the scene, with empty counters.
+    #[inline]
+    pub fn tracer(&self) -> Tracer<'_> {
+        let has_masks = self.features.contains(Features::MASKS);
+        Tracer::new(&*self.query, has_masks.then_some(self))
+    }
+
     /// The light that the surface hit belongs to.
     #[inline]
     pub fn light_of(&self, hit: &Hit) -> Option<LightId> {
         self.triangles.mesh(hit).light(hit.triangle).map(LightId)
+    }
+}
+
+impl MaskLookup for PreparedScene {
+    fn mask_point(&self, hit: &Hit) -> MaskPoint {
+        let (point, material) = self.surface_point(hit);
+        MaskPoint { p: point.p, error: point.error, ng: point.ng, holes: material.holes(&point) }
     }
 }

@@ -151,7 +151,12 @@ impl Wants {
         let wants = materials.get(shape.bsdf).features();
         let emission_textured = shape.emission.as_ref().is_some_and(|e| matches!(e.radiance, ColorDesc::Texture(_)));
         Wants {
-            surface: if wants.interface() { SurfaceMask::INTERFACES } else { SurfaceMask::BLOCKERS },
+            surface: match (wants.passes_through, wants.scatters || shape.emission.is_some()) {
+                (false, _) => SurfaceMask::BLOCKERS,
+                (true, false) => SurfaceMask::INTERFACES,
+                // Walks must meet emission.
+                (true, true) => SurfaceMask::MASKS,
+            },
             tangents: wants.oriented,
             uvs: wants.textured || wants.oriented || emission_textured,
             colors: wants.textured,

@@ -46,12 +46,13 @@ pub fn compare(a: &dyn RayQuery, b: &dyn RayQuery, bounds: (Vec3, Vec3), count: 
     let (lo, hi) = bounds;
     let mut packet = SegmentPacket::default();
     let mut last = 0.5 * (lo + hi);
-    for _ in 0..count {
+    for i in 0..count {
         let [x, y, z, w] = rng.next_4();
         let o = lo + (hi - lo) * Vec3::new(x, y, z);
         let ray = Ray::leaving(o, warp::square_to_sphere([w, rng.next_f32()]));
         out.rays += 1;
-        match (a.closest(&ray), b.closest(&ray)) {
+        let surfaces = if i % 2 == 0 { SurfaceMask::VISIBLE } else { SurfaceMask::ALL };
+        match (a.closest_of(&ray, surfaces), b.closest_of(&ray, surfaces)) {
             (None, None) => {}
             (Some(ha), Some(hb)) => {
                 out.both_hit += 1;
@@ -73,10 +74,12 @@ pub fn compare(a: &dyn RayQuery, b: &dyn RayQuery, bounds: (Vec3, Vec3), count: 
             continue;
         }
         out.segments += 1;
-        for mask in [SurfaceMask::ALL, SurfaceMask::BLOCKERS, SurfaceMask::INTERFACES] {
+        for mask in [SurfaceMask::ALL, SurfaceMask::BLOCKERS, SurfaceMask::MASKS, SurfaceMask::INTERFACES] {
             let blocked = [a, b].map(|query| query.occluded(&segment.ray(), mask));
             out.occlusion += u64::from(blocked[0] != blocked[1]);
         }
+        let crossed = [a, b].map(|query| query.closest_of(&segment.ray(), SurfaceMask::MASKS).is_some());
+        out.occlusion += u64::from(crossed[0] != crossed[1]);
         packet.push(&segment);
         if packet.len == super::PACKET {
             for query in [a, b] {
@@ -142,15 +145,18 @@ mod tests {
         }
     }
 
-    /// Two soups, of which one is an interface, in the world and in instances.
+    /// Soups of surfaces of every kind, in the world and in instances.
     #[test]
-    fn interfaces_are_told_apart_from_blockers() {
-        let [a, b, c, d] = [0, 1, 2, 3].map(|i| soup(100, 1.0, Vec3::splat(0.1 * i as f32), 30 + i));
-        let interface = |mesh: MeshBuffers| MeshBuffers { surface: SurfaceMask::INTERFACES, ..mesh };
+    fn kinds_of_surfaces_are_told_apart() {
+        let kinds = [SurfaceMask::BLOCKERS, SurfaceMask::MASKS, SurfaceMask::INTERFACES];
+        let mesh = |i: usize| {
+            let mesh = soup(80, 1.0, Vec3::splat(0.1 * i as f32), 30 + i as u64);
+            MeshBuffers { surface: kinds[i % 3], ..mesh }
+        };
         let geometry = Geometry {
-            meshes: vec![a, interface(b), interface(c), d],
-            world: vec![0, 1],
-            groups: vec![vec![2, 3]],
+            meshes: (0..6).map(mesh).collect(),
+            world: vec![0, 1, 2],
+            groups: vec![vec![3, 4, 5]],
             instances: vec![Instance { group: 0, to_world: Affine3A::from_translation(Vec3::X) }],
             ..Geometry::default()
         };
@@ -192,7 +198,7 @@ mod tests {
         check(Geometry { meshes, world: vec![0], groups, instances, ..Geometry::default() }, 1e-3);
     }
 
-    /// Round shapes of every kind among triangles, in the world and in stretched instances; some are interfaces.
+    /// Round shapes of every form among triangles, of every kind of surface, in the world and in stretched instances.
     #[test]
     fn round_shapes_agree() {
         let mut rng = HashRng::new(17, 1, 0, 0);
@@ -202,7 +208,11 @@ mod tests {
             let to_place = DMat4::from_translation(DVec3::new(x, y, z) - 0.5)
                 * DMat4::from_euler(glam::EulerRot::XYZ, 6.0 * x, 6.0 * y, 6.0 * z)
                 * DMat4::from_scale(DVec3::new(0.05 + 0.2 * w, 0.05 + 0.2 * x, 0.1));
-            let surface = if i.is_multiple_of(4) { SurfaceMask::INTERFACES } else { SurfaceMask::BLOCKERS };
+            let surface = match i % 4 {
+                0 => SurfaceMask::INTERFACES,
+                1 => SurfaceMask::MASKS,
+                _ => SurfaceMask::BLOCKERS,
+            };
             RoundShape::new(kind, to_place, false, surface)
         };
         let round: Vec<RoundShape> = (0..60).map(&mut shape).collect();

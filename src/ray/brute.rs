@@ -75,11 +75,11 @@ impl RayQuery for BruteScene {
         "brute force in double precision".into()
     }
 
-    fn closest(&self, ray: &Ray) -> Option<Hit> {
+    fn closest_of(&self, ray: &Ray, surfaces: SurfaceMask) -> Option<Hit> {
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
         let mut nearest = f64::from(ray.t_max);
         let mut best = None;
-        for tri in &self.triangles {
+        for tri in self.triangles.iter().filter(|tri| tri.surface.intersects(surfaces)) {
             if let Some((t, u, v)) = intersect(&tri.corners, o, d)
                 && t >= f64::from(ray.t_min)
                 && t < nearest
@@ -96,7 +96,8 @@ impl RayQuery for BruteScene {
             }
         }
         for Round { shape, surface, instance } in &self.round {
-            if let Some((t, [u, v])) = shape.intersect(ray.o, ray.d, [ray.t_min, ray.t_max])
+            if shape.surface.intersects(surfaces)
+                && let Some((t, [u, v])) = shape.intersect(ray.o, ray.d, [ray.t_min, ray.t_max])
                 && t < nearest
             {
                 nearest = t;

@@ -466,10 +466,10 @@ fn raw_ray(ray: &Ray, surfaces: SurfaceMask) -> RayRows {
 }
 
 impl EmbreeScene {
-    /// [`RayQuery::closest`], for callers that know the backend.
+    /// [`RayQuery::closest_of`], for callers that know the backend.
     #[inline(always)]
-    pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut rows = RayHitRows { ray: raw_ray(ray, SurfaceMask::ALL), hit: RTCHit::default() };
+    pub fn first_hit(&self, ray: &Ray, surfaces: SurfaceMask) -> Option<Hit> {
+        let mut rows = RayHitRows { ray: raw_ray(ray, surfaces), hit: RTCHit::default() };
         rows.hit.geomID = u32::MAX;
         rows.hit.instID = [u32::MAX];
         // SAFETY: the scene is committed and alive, the ray is valid (checked by the caller, see `Ray::is_valid`). Both
@@ -517,8 +517,8 @@ impl RayQuery for EmbreeScene {
         Some(self)
     }
 
-    fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.first_hit(ray)
+    fn closest_of(&self, ray: &Ray, surfaces: SurfaceMask) -> Option<Hit> {
+        self.first_hit(ray, surfaces)
     }
 
     fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {

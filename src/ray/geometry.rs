@@ -35,12 +35,16 @@ impl Deref for VertexBuffer {
 pub struct SurfaceMask(u32);
 
 impl SurfaceMask {
-    /// Surfaces that scatter or absorb light, wholly or in part.
+    /// Surfaces that let no light straight through.
     pub const BLOCKERS: SurfaceMask = SurfaceMask(1);
+    /// Surfaces with holes: they let a known share of the light straight through, which may differ from point to point.
+    pub const MASKS: SurfaceMask = SurfaceMask(2);
     /// Surfaces that light passes unchanged and in its direction: `null` materials, which bound media and nothing else.
-    pub const INTERFACES: SurfaceMask = SurfaceMask(2);
+    pub const INTERFACES: SurfaceMask = SurfaceMask(4);
+    /// Surfaces that can be seen: all but interfaces.
+    pub const VISIBLE: SurfaceMask = SurfaceMask(3);
     /// All surfaces.
-    pub const ALL: SurfaceMask = SurfaceMask(3);
+    pub const ALL: SurfaceMask = SurfaceMask(7);
 
     /// The bits.
     #[inline]
@@ -108,6 +112,12 @@ impl Geometry {
     /// Round shapes that a ray can meet, instances counted each time.
     pub fn round_count(&self) -> usize {
         self.count(|surfaces| surfaces.len() - self.meshes_of(surfaces).len())
+    }
+
+    /// There are surfaces of the kinds `surfaces`.
+    pub fn has_any_of(&self, surfaces: SurfaceMask) -> bool {
+        let kinds = self.meshes.iter().map(|mesh| mesh.surface).chain(self.round.iter().map(|shape| shape.surface));
+        kinds.into_iter().any(|kind| kind.intersects(surfaces))
     }
 
     /// Sum of a number over the world and the group of every instance.

@@ -21,11 +21,13 @@ pub mod offset;
 pub mod phases;
 pub mod round;
 pub mod tracer;
+pub mod transmittance;
 
 pub use geometry::{Geometry, Instance, MeshBuffers, SurfaceMask, VertexBuffer};
 pub use phases::Phases;
 pub use round::{RoundPoint, RoundShape};
 pub use tracer::{RayKind, RayStats, Tracer, Work};
+pub use transmittance::{MaskLookup, MaskPoint, Transmittance};
 
 use crate::math::Vec3;
 use glam::Vec3A;
@@ -136,7 +138,7 @@ impl Default for SegmentPacket {
             d: [[0.0; PACKET]; 3],
             t_max: [0.0; PACKET],
             len: 0,
-            blockers: SurfaceMask::ALL,
+            blockers: SurfaceMask::BLOCKERS,
         }
     }
 }
@@ -175,8 +177,13 @@ pub trait RayQuery: Send + Sync {
         None
     }
 
-    /// The first thing the ray meets. The ray must be valid ([`Ray::is_valid`]).
-    fn closest(&self, ray: &Ray) -> Option<Hit>;
+    /// The first surface of the kinds `surfaces` that the ray meets. The ray must be valid ([`Ray::is_valid`]).
+    fn closest_of(&self, ray: &Ray, surfaces: SurfaceMask) -> Option<Hit>;
+
+    /// The first surface that the ray meets; interfaces are none. The ray must be valid ([`Ray::is_valid`]).
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_of(ray, SurfaceMask::VISIBLE)
+    }
 
     /// Is a surface of the kinds `blockers` in the ray's interval? The ray must be valid.
     fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool;

@@ -86,22 +86,22 @@ impl RoundTree {
         Some(RoundTree { tree, round: order.iter().map(|&i| round[i as usize].clone()).collect() })
     }
 
-    /// The first round shape in the ray's interval; `inner` is the ray in the private space, `length` as from
+    /// The first round shape of the kinds `surfaces` in the ray's interval; `inner` is the ray in the private space, `length` as from
     /// [`ObvhsScene::enter`].
-    fn closest(&self, ray: &Ray, inner: TreeRay, length: f32) -> Option<Hit> {
+    fn closest(&self, ray: &Ray, inner: TreeRay, length: f32, surfaces: SurfaceMask) -> Option<Hit> {
         let (mut best, mut nearest) = (None, f64::INFINITY);
         let mut hit = RayHit::none();
         self.tree.ray_traverse(inner, &mut hit, |_, id| {
             let Round { shape, surface, instance } = &self.round[id];
             match shape.intersect(ray.o, ray.d, [ray.t_min, ray.t_max]) {
-                Some((t, [u, v])) => {
+                Some((t, [u, v])) if shape.surface.intersects(surfaces) => {
                     if t < nearest {
                         nearest = t;
                         best = Some(Hit { t: t as f32, u, v, triangle: 0, mesh: *surface, instance: *instance });
                     }
                     t as f32 * length
                 }
-                None => f32::INFINITY,
+                _ => f32::INFINITY,
             }
         });
         best
@@ -213,12 +213,12 @@ impl RayQuery for ObvhsScene {
         "obvhs (CWBVH, pure Rust)".into()
     }
 
-    fn closest(&self, ray: &Ray) -> Option<Hit> {
+    fn closest_of(&self, ray: &Ray, surfaces: SurfaceMask) -> Option<Hit> {
         let (inner, length) = self.enter(ray)?;
-        let Some(round) = &self.round else { return self.closest_triangle(inner, length) };
-        let triangle = self.closest_triangle(inner, length);
+        let Some(round) = &self.round else { return self.closest_triangle(inner, length, surfaces) };
+        let triangle = self.closest_triangle(inner, length, surfaces);
         let nearest = Ray { t_max: triangle.map_or(ray.t_max, |hit| hit.t), ..*ray };
-        round.closest(&nearest, self.enter(&nearest)?.0, length).or(triangle)
+        round.closest(&nearest, self.enter(&nearest)?.0, length, surfaces).or(triangle)
     }
 
     fn occluded(&self, ray: &Ray, blockers: SurfaceMask) -> bool {
@@ -229,21 +229,21 @@ impl RayQuery for ObvhsScene {
 }
 
 impl ObvhsScene {
-    /// The first triangle in the interval of the ray `inner` in the private space, where a unit of the ray parameter is
+    /// The first triangle of the kinds `surfaces` in the interval of the ray `inner` in the private space, where a unit of the ray parameter is
     /// `length` long.
-    fn closest_triangle(&self, inner: TreeRay, length: f32) -> Option<Hit> {
+    fn closest_triangle(&self, inner: TreeRay, length: f32, surfaces: SurfaceMask) -> Option<Hit> {
         let tree = self.tree.as_ref()?;
         let mut best = (0.0, 0.0);
         let mut nearest = f32::INFINITY;
         let mut hit = RayHit::none();
         let found = tree.ray_traverse(inner, &mut hit, |ray, id| match intersect(&self.corners[id], ray) {
-            Some((t, u, v)) => {
+            Some((t, u, v)) if self.identities[id].surface.intersects(surfaces) => {
                 if t < nearest {
                     (nearest, best) = (t, (u, v));
                 }
                 t
             }
-            None => f32::INFINITY,
+            _ => f32::INFINITY,
         });
         found.then(|| {
             let id = &self.identities[hit.primitive_id as usize];

@@ -10,7 +10,7 @@
 
 #[cfg(any(embree3, embree4))]
 use super::embree::EmbreeScene;
-use super::{Hit, PACKET, Phases, Ray, RayQuery, SegmentPacket};
+use super::{Hit, MaskLookup, PACKET, Phases, Ray, RayQuery, SegmentPacket, SurfaceMask};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
@@ -39,11 +39,13 @@ pub enum RayKind {
     ShadowPmf,
     /// Between a cache point and a light vertex, for a weight.
     ShadowWeight,
+    /// To the next mask on a segment that nothing else blocks.
+    Mask,
 }
 
 impl RayKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [RayKind; 10] = [
+    pub const ALL: [RayKind; 11] = [
         RayKind::Camera,
         RayKind::Bounce,
         RayKind::ShadowDirect,
@@ -54,6 +56,7 @@ impl RayKind {
         RayKind::Cache,
         RayKind::ShadowPmf,
         RayKind::ShadowWeight,
+        RayKind::Mask,
     ];
 
     /// It asks only whether something is in the way.
@@ -75,6 +78,7 @@ impl RayKind {
             RayKind::Cache => "cache",
             RayKind::ShadowPmf => "shadow_pmf",
             RayKind::ShadowWeight => "shadow_weight",
+            RayKind::Mask => "mask",
         }
     }
 }
@@ -200,7 +204,8 @@ pub struct RayStats {
     pub kinds: [KindStats; KINDS],
     /// By kind of work.
     pub work: [WorkStats; Work::ALL.len()],
-    /// Rays with a component that is not finite; they were not traced.
+    /// Rays with a component that is not finite, which were not traced, and rays that would have crossed more masks than
+    /// [`MAX_CROSSINGS`](super::transmittance::MAX_CROSSINGS).
     pub invalid: u64,
     /// Wall seconds by phase.
     pub phases: Phases,
@@ -241,8 +246,13 @@ impl RayStats {
 
 /// The closest hit of the ray with these numbers by a virtual call.
 #[inline(never)]
-fn closest_virtual(query: &dyn RayQuery, o: [f32; 3], d: [f32; 3], [t_min, t_max]: [f32; 2]) -> Option<Hit> {
-    query.closest(&Ray { o: o.into(), d: d.into(), t_min, t_max })
+fn closest_virtual(
+    query: &dyn RayQuery,
+    [o, d]: [[f32; 3]; 2],
+    [t_min, t_max]: [f32; 2],
+    surfaces: SurfaceMask,
+) -> Option<Hit> {
+    query.closest_of(&Ray { o: o.into(), d: d.into(), t_min, t_max }, surfaces)
 }
 
 /// One thread's access to the backend.
@@ -252,6 +262,8 @@ pub struct Tracer<'a> {
     /// Embree reads it, and the hit comes back into registers.
     #[cfg(any(embree3, embree4))]
     embree: Option<&'a EmbreeScene>,
+    /// Opacities, if the scene has masks.
+    masks: Option<&'a dyn MaskLookup>,
     /// Counters so far.
     pub stats: RayStats,
     until_timed: u32,
@@ -259,18 +271,25 @@ pub struct Tracer<'a> {
 }
 
 impl<'a> Tracer<'a> {
-    /// A tracer with empty counters.
-    pub fn new(query: &'a dyn RayQuery) -> Tracer<'a> {
+    /// A tracer with empty counters; `masks` knows the opacities of a scene's masks, if there are any.
+    pub fn new(query: &'a dyn RayQuery, masks: Option<&'a dyn MaskLookup>) -> Tracer<'a> {
         LazyLock::force(&CLOCK_NS);
         let first = 1 + TRACERS.fetch_add(1, Ordering::Relaxed).wrapping_mul(97) % TIMED_ONE_IN;
         Tracer {
             query,
             #[cfg(any(embree3, embree4))]
             embree: query.as_embree(),
+            masks,
             stats: RayStats::default(),
             until_timed: first,
             until_timed_work: first,
         }
+    }
+
+    /// Opacities, if the scene has masks.
+    #[inline]
+    pub(super) fn masks(&self) -> Option<&'a dyn MaskLookup> {
+        self.masks
     }
 
     /// It is the next query's turn to be timed.
@@ -314,14 +333,21 @@ impl<'a> Tracer<'a> {
     /// in registers.
     #[cold]
     #[inline(never)]
-    fn closest_timed(&mut self, o: [f32; 3], d: [f32; 3], t: [f32; 2], kind: RayKind) -> Option<Hit> {
-        self.timed(kind, |query| closest_virtual(query, o, d, t))
+    fn closest_timed(&mut self, line: [[f32; 3]; 2], t: [f32; 2], surfaces: SurfaceMask, kind: RayKind) -> Option<Hit> {
+        self.timed(kind, |query| closest_virtual(query, line, t, surfaces))
     }
 
-    /// The first thing the ray meets; a ray that is not valid meets nothing and is counted.
-    // Out of line, ray and hit would go through memory.
+    /// The first surface that the ray meets, interfaces apart; a ray that is not valid meets nothing and is counted.
     #[inline(always)]
     pub fn closest(&mut self, ray: &Ray, kind: RayKind) -> Option<Hit> {
+        self.closest_of(ray, SurfaceMask::VISIBLE, kind)
+    }
+
+    /// The first surface of the kinds `surfaces` that the ray meets; a ray that is not valid meets nothing and is
+    /// counted.
+    // Out of line, ray and hit would go through memory.
+    #[inline(always)]
+    pub fn closest_of(&mut self, ray: &Ray, surfaces: SurfaceMask, kind: RayKind) -> Option<Hit> {
         if !ray.is_valid() {
             self.stats.invalid += 1;
             return None;
@@ -329,15 +355,15 @@ impl<'a> Tracer<'a> {
         self.stats.kinds[kind as usize].rays += 1;
         // Part by part both ways: what is only ever passed by reference on this way must not be kept in memory on the
         // other.
-        let (o, d, t) = ([ray.o.x, ray.o.y, ray.o.z], [ray.d.x, ray.d.y, ray.d.z], [ray.t_min, ray.t_max]);
+        let (line, t) = ([[ray.o.x, ray.o.y, ray.o.z], [ray.d.x, ray.d.y, ray.d.z]], [ray.t_min, ray.t_max]);
         let hit = if self.should_time() {
-            self.closest_timed(o, d, t, kind)
+            self.closest_timed(line, t, surfaces, kind)
         } else {
             #[cfg(any(embree3, embree4))]
             if let Some(embree) = self.embree {
-                return embree.first_hit(ray);
+                return embree.first_hit(ray, surfaces);
             }
-            closest_virtual(self.query, o, d, t)
+            closest_virtual(self.query, line, t, surfaces)
         }?;
         Some(Hit { t: hit.t, u: hit.u, v: hit.v, triangle: hit.triangle, mesh: hit.mesh, instance: hit.instance })
     }
@@ -357,5 +383,16 @@ impl<'a> Tracer<'a> {
         stats.blocked += u64::from(mask.count_ones());
         self.stats.invalid += u64::from(invalid);
         mask
+    }
+
+    /// Bit `i` set: some light passes segment `i`.
+    pub fn visible_packet(&mut self, packet: &SegmentPacket, kind: RayKind) -> u16 {
+        if packet.len == 0 {
+            return 0;
+        }
+        let blocked = self.occluded_packet(packet, kind);
+        (0..packet.len)
+            .filter(|i| blocked >> i & 1 == 0 && !self.transmittance(&packet.get(*i)).is_zero())
+            .fold(0, |seen, i| seen | 1 << i)
     }
 }

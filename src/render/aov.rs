@@ -1,12 +1,13 @@
-//! Auxiliary layers: what the camera sees first, averaged over a few rays per pixel. They need no integrator.
+//! Auxiliary layers: what the camera sees first, averaged over a few rays per pixel. They need no integrator. Rays go
+//! through the holes of masks by chance, as walks do.
 
 use crate::film::Film;
 use crate::image::Layer;
 use crate::math::Vec3;
 use crate::math::sampler::PathSampler;
-use crate::path::streams;
+use crate::path::{first_seen, streams};
 use crate::prepared::PreparedScene;
-use crate::ray::{Ray, RayKind, Tracer};
+use crate::ray::Ray;
 use rayon::prelude::*;
 
 /// Rays per pixel; auxiliary layers converge quickly.
@@ -53,15 +54,15 @@ pub fn layers(scene: &PreparedScene, film: &Film, seed: u64, wanted: &[Aov]) -> 
 }
 
 fn pixel(scene: &PreparedScene, x: u32, y: u32, seed: u64) -> [f32; 7] {
-    let mut tracer = Tracer::new(&*scene.query);
+    let mut tracer = scene.tracer();
     let mut sum = [0.0f32; 7];
     let index = u64::from(y) * u64::from(scene.film_size[0]) + u64::from(x);
     for k in 0..RAYS {
-        let u = PathSampler::new(seed, streams::AUXILIARY, index, k).origin();
+        let mut sampler = PathSampler::new(seed, streams::AUXILIARY, index, k);
+        let u = sampler.origin();
         let eye = scene.camera.sample_ray([x as f32 + u[0], y as f32 + u[1]], [u[2], u[3]]);
         let ray = Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far };
-        let Some(hit) = tracer.closest(&ray, RayKind::Camera) else { continue };
-        let (point, material) = scene.surface_point(&hit);
+        let Some((hit, point, material)) = first_seen(scene, &ray, &mut tracer, sampler.rng()) else { continue };
         let albedo = material.resolve(&point, -ray.d).albedo();
         let n: Vec3 = point.frame.n;
         for (s, v) in sum.iter_mut().zip([albedo.r, albedo.g, albedo.b, n.x, n.y, n.z, hit.t]) {

@@ -6,7 +6,7 @@
 //! well: an open scene ends there, as if the box around it were a room.
 
 use crate::math::Vec3;
-use crate::ray::{Geometry, RoundShape};
+use crate::ray::{Geometry, RoundShape, SurfaceMask};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -54,6 +54,10 @@ impl VoxelGrid {
         let marks: Vec<AtomicBool> = (0..count).map(|_| AtomicBool::new(false)).collect();
         geometry.for_each_placed_mesh(|mesh, _, to_world| {
             let buffers = &geometry.meshes[mesh as usize];
+            // Interfaces are part of the empty space.
+            if !buffers.surface.intersects(SurfaceMask::VISIBLE) {
+                return;
+            }
             buffers.triangles.par_iter().with_min_len(CHUNK).for_each(|corners| {
                 let corners = corners.map(|i| {
                     let p = buffers.positions[i as usize];
@@ -64,7 +68,9 @@ impl VoxelGrid {
             });
         });
         geometry.for_each_placed_round(|_, _, shape| {
-            mark_round(&grid, &shape, |i| marks[i].store(true, Ordering::Relaxed));
+            if shape.surface.intersects(SurfaceMask::VISIBLE) {
+                mark_round(&grid, &shape, |i| marks[i].store(true, Ordering::Relaxed));
+            }
         });
         grid.solid = marks.into_iter().map(AtomicBool::into_inner).collect();
         for i in 0..count {
@@ -248,7 +254,7 @@ fn touches(c: [Vec3; 3], half: f32) -> bool {
 mod tests {
     use super::*;
     use crate::math::hash::HashRng;
-    use crate::ray::{Instance, MeshBuffers, SurfaceMask, VertexBuffer};
+    use crate::ray::{Instance, MeshBuffers, VertexBuffer};
     use glam::Affine3A;
 
     /// Random triangles, small and large, and some of them again as a turned and stretched instance.

@@ -16,6 +16,7 @@ mod image_metrics;
 mod images;
 mod kills;
 mod leaks;
+mod masks;
 mod measure;
 mod options;
 mod outputs;

@@ -157,7 +157,7 @@ fn techniques_agree(
     for &name in scenes {
         let scene = prepare(exhibit(name), Backend::default_available(), None);
         // Through delta events only some techniques make a path.
-        if scene.features.contains(Features::SPECULAR) || scene.features.contains(Features::MASKS) {
+        if scene.features.contains(Features::SPECULAR) {
             continue;
         }
         let renders: Vec<_> = (0..RENDERS)

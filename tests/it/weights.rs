@@ -14,7 +14,7 @@ use lightsieve::mis::{
 };
 use lightsieve::path::{FullPath, PathLimits, ScatterSampler};
 use lightsieve::prepared::PreparedScene;
-use lightsieve::ray::Backend;
+use lightsieve::ray::{Backend, Transmittance};
 
 /// Every path that bidirectional path tracing finds in a grid of pixels.
 fn found(
@@ -134,6 +134,8 @@ struct Subpath<'a> {
     own: &'a dyn Fn(usize) -> f64,
     /// Density of vertex i by the walk from the other end.
     other: &'a dyn Fn(usize) -> f64,
+    /// Transmittance of the edge between vertices i − 1 and i.
+    transmittance: &'a dyn Fn(usize) -> f64,
     connectable: &'a dyn Fn(usize) -> bool,
     end: PathEnd,
 }
@@ -151,8 +153,8 @@ impl Subpath<'_> {
                 survival: 1.0,
                 rev_over_fwd: if i + 2 < n { (other(i) / own(i)) as f32 } else { POISON },
                 connectable: i + 1 < n && (self.connectable)(i),
+                connection_factor: if i > 0 { (1.0 / (self.transmittance)(i)) as f32 } else { 1.0 },
                 partial_sums: [POISON; 2],
-                ..VertexPdfs::origin(AreaPdf(0.0))
             })
             .collect();
         // All but the last vertex have been left.
@@ -174,19 +176,30 @@ fn fast(mis: &MisContext<Balance>, d: &PathPdfs, s: usize) -> f32 {
     let connectable = |i: usize| i == 0 || i == k || d.connectable[i] || d.connectable[i + 1];
     let emitter = EmitterFactors { can_be_hit: d.connectable[0], next_event: d.next_event as f32 };
     let light = |i: usize| d.light.get(i).copied().unwrap_or(0.0);
-    let light_side =
-        Subpath { n: s, own: &light, other: &|i| d.eye[i], connectable: &connectable, end: PathEnd::Light(emitter) };
+    let light_side = Subpath {
+        n: s,
+        own: &light,
+        other: &|i| d.eye[i],
+        transmittance: &|i| d.transmittances[i],
+        connectable: &connectable,
+        end: PathEnd::Light(emitter),
+    };
     let eye_side = Subpath {
         n: k + 1 - s,
         own: &|i| d.eye[k - i],
         other: &|i| light(k - i),
+        transmittance: &|i| d.transmittances[k + 1 - i],
         connectable: &|i| connectable(k - i),
         end: PathEnd::Lens,
     };
     let ((light, light_end), (eye, eye_end)) = (light_side.pdfs(mis), eye_side.pdfs(mis));
     let reverse = ReversePath { vertices: &[], edges: &[], last_edge: (), throughput: Rgb::BLACK, value: Rgb::BLACK };
     let path = ConnectedPath { light: &light, light_end, eye: &eye, eye_end, emitter, connection_factor: 1.0, reverse };
-    mis.weight(&path).own
+    // As where the transmittance of the connection is found after the weight.
+    let open = mis.weight(&path);
+    let mut transmittance = Transmittance::ONE;
+    transmittance *= d.transmittances[s] as f32;
+    open.through(transmittance, mis.heuristic, (s, k + 1 - s)).own
 }
 
 #[test]

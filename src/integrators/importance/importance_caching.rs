@@ -26,8 +26,8 @@ pub static IMPORTANCE_CACHING: IntegratorSpec = IntegratorSpec {
     ],
     unbiased: true,
     limitations: |features| {
-        let specular = (features.contains(Features::SPECULAR) || features.contains(Features::MASKS)).then(|| {
-            "what the camera sees in mirrors, and through glass or masks, stays black: only its first hit is connected to lights".into()
+        let specular = features.contains(Features::SPECULAR).then(|| {
+            "what the camera sees in mirrors and through glass stays black: only its first hit is connected to lights".into()
         });
         bidirectional::with_narrow_lobes(features, specular)
     },

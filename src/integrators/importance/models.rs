@@ -99,7 +99,7 @@ impl RecordFactor for RecordMixtureFactor {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RecordVisibility {
     near: NearestRecords,
-    /// Bit i set: nothing is between record i and the light vertex.
+    /// Bit i set: light of the light vertex reaches record i.
     mask: u16,
 }
 
@@ -125,10 +125,7 @@ impl RecordFactor for PerLengthFactor {
                 packet.push(&segment(end, y));
             }
         }
-        lookup.mask = match packet.len {
-            0 => 0,
-            _ => !tracer.occluded_packet(&packet, RayKind::ShadowWeight),
-        };
+        lookup.mask = tracer.visible_packet(&packet, RayKind::ShadowWeight);
     }
 
     fn edge(

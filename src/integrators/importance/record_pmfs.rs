@@ -226,7 +226,7 @@ impl Weights {
         for v in 0..vertices {
             self.find_vertex(source, v, tracer, &mut queue);
         }
-        queue.flush(tracer, |UnshadowedLight { at, light }, _| self.seen[at] = light);
+        queue.flush(tracer, |arriving, transmittance| self.seen[arriving.at] = arriving.light * transmittance.share());
     }
 
     /// Finds the weights of one vertex; those that count visibility arrive by `queue`, which has their places.
@@ -259,8 +259,8 @@ impl Weights {
             }
             if wants(Distribution::Visible) {
                 let (segment, seen) = (segment(&records.ends[group.start + record], &end), &mut self.seen);
-                queue.push(&segment, UnshadowedLight { at, light: open }, tracer, |arriving, _| {
-                    seen[arriving.at] = arriving.light;
+                queue.push(&segment, UnshadowedLight { at, light: open }, tracer, |arriving, transmittance| {
+                    seen[arriving.at] = arriving.light * transmittance.share();
                 });
             }
         }

@@ -21,8 +21,9 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
     params: &[&[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS]],
     unbiased: true,
     limitations: |features| {
-        let specular = (features.contains(Features::SPECULAR) || features.contains(Features::MASKS)).then(|| {
-            "what the camera sees in mirrors, and through glass or masks, stays black: no connection from a light can reach it".into()
+        let specular = features.contains(Features::SPECULAR).then(|| {
+            "what the camera sees in mirrors and through glass stays black: no connection from a light can reach it"
+                .into()
         });
         bidirectional::with_narrow_lobes(features, specular)
     },

@@ -3,7 +3,8 @@
 //! Two techniques make every path of k edges that ends on a light with extent. Seen from its last vertex x before the
 //! light, *hit* draws the direction from the BSDF, with density p_bsdf · q (q: survival of Russian roulette at x) per
 //! steradian, and *next event* draws a light with probability P(l | x) and a direction to it with density p_l per
-//! steradian. Both weigh their paths by the heuristic over these two densities, so the weights of a path sum to one.
+//! steradian. Both weigh their paths by the heuristic over these two densities, so the weights of a path sum to one. A
+//! hit walks through the holes of the masks between, so its density is τ p_bsdf · q (`ray::transmittance`).
 //! Delta lights are reached by next event alone, and after a delta event or from the camera lights are hit alone, each
 //! with weight one.
 
@@ -19,11 +20,11 @@ use crate::math::sampler::PathSampler;
 use crate::math::{Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Heuristic;
 use crate::path::{
-    Edge, PathLimits, ScatterSampler, ShadowQueue, Transmittance, Vertex, WalkHooks, WalkRules, WalkStart,
-    direct_segment, streams, walk,
+    Edge, PathLimits, ScatterSampler, ShadowQueue, Vertex, WalkHooks, WalkRules, WalkStart, direct_segment, streams,
+    walk,
 };
 use crate::prepared::{Features, PreparedScene};
-use crate::ray::{Phases, RayKind, RayStats, Tracer};
+use crate::ray::{Phases, RayKind, RayStats, Tracer, Transmittance};
 use crate::shade::Transport;
 use rayon::prelude::*;
 
@@ -88,10 +89,9 @@ impl PathTracer {
     }
 
     /// Light that no path of this method brings in a scene with these features: it meets a delta light only by next
-    /// event, which mirrors, glass and masks block.
+    /// event, which mirrors and glass block.
     pub fn is_blind(features: Features) -> bool {
-        features.contains(Features::DELTA_LIGHTS)
-            && (features.contains(Features::SPECULAR) || features.contains(Features::MASKS))
+        features.contains(Features::DELTA_LIGHTS) && features.contains(Features::SPECULAR)
     }
 
     /// Samples some pixels of every tile a few times, by random numbers of their own.
@@ -156,7 +156,9 @@ impl PathTracer {
             hooks.pixel = pixel;
             self.sample(iteration, choice.stream, tile.pixel(pixel), &mut tracer, &mut hooks);
         }
-        queue.flush(&mut tracer, |light, transmittance| light.arrive(transmittance, samples, None));
+        queue.flush(&mut tracer, |light, transmittance| {
+            light.through(transmittance, self.heuristic).arrive(samples, None);
+        });
         tile.commit(samples, None, iteration.index);
         tracer.stats
     }
@@ -180,16 +182,27 @@ struct QueuedLight {
     pixel: u32,
     /// Number of the contribution in a replay.
     replay_index: u32,
-    light: Rgb,
+    /// Estimate of the technique by itself.
+    raw: Rgb,
+    weight: f32,
 }
 
 impl QueuedLight {
+    /// The light behind the masks on the segment.
+    #[inline]
+    fn through(self, transmittance: Transmittance, heuristic: Heuristic) -> QueuedLight {
+        let weight = heuristic.weight_through(self.weight, transmittance);
+        QueuedLight { raw: self.raw * transmittance, weight, ..self }
+    }
+
     /// Nothing blocked the ray.
     #[inline]
-    fn arrive(self, transmittance: Transmittance, samples: &mut SampleBuffer, replay: Option<&mut Replay>) {
-        samples.add(ContributionKind::NextEvent, self.pixel, self.light * transmittance);
+    fn arrive(self, samples: &mut SampleBuffer, replay: Option<&mut Replay>) {
+        let QueuedLight { pixel, replay_index, raw, weight } = self;
+        samples.add(ContributionKind::NextEvent, pixel, raw * weight);
         if let Some(replay) = replay {
-            replay.contributions[self.replay_index as usize].visible = true;
+            let contribution = &mut replay.contributions[replay_index as usize];
+            (contribution.raw, contribution.weight, contribution.visible) = (raw, weight, true);
         }
     }
 }
@@ -207,7 +220,7 @@ impl Integrator for PathTracer {
         hooks.replay = Some(&mut replay);
         self.sample(iteration, streams::PATH, pixel, &mut tracer, &mut hooks);
         queue.flush(&mut tracer, |light, transmittance| {
-            light.arrive(transmittance, &mut samples, Some(&mut replay));
+            light.through(transmittance, self.heuristic).arrive(&mut samples, Some(&mut replay));
         });
         replay
     }
@@ -263,18 +276,28 @@ impl<'a> Gather<'a> {
             let survival = self.rules.limits.survival(vertex.index, &vertex.scatter);
             self.rules.heuristic.weight(direct.pdf, SolidAnglePdf(direct.scatter_pdf.0 * survival))
         };
-        let light = direct.raw * weight;
         // A black contribution needs no ray; one that is not finite goes on to the film, which reports it.
-        if light.is_black() {
+        if (direct.raw * weight).is_black() {
             return;
         }
         let segment = direct_segment(&vertex.place.segment_end(), sample);
         let replay_index = self.record((1, vertex.index as usize + 1), direct.raw, weight, false);
-        let queued = QueuedLight { pixel: self.pixel, replay_index, light };
-        let (samples, replay) = (&mut *self.samples, &mut self.replay);
+        let queued = QueuedLight { pixel: self.pixel, replay_index, raw: direct.raw, weight };
+        let (samples, replay, heuristic) = (&mut *self.samples, &mut self.replay, self.rules.heuristic);
         self.queue.push(&segment, queued, tracer, |light, transmittance| {
-            light.arrive(transmittance, samples, replay.as_deref_mut());
+            light.through(transmittance, heuristic).arrive(samples, replay.as_deref_mut());
         });
+    }
+
+    /// Adds the emission of the surface that `vertex` is on.
+    #[inline]
+    fn emission(&mut self, vertex: &Vertex) {
+        if !self.hidden(vertex.index)
+            && let Some((light, emitted)) = emitted_at(self.scene, vertex)
+        {
+            let (direction, raw, ng) = (-vertex.wo, vertex.throughput * emitted, vertex.place.normal());
+            self.hit(&EmitterHit { light, index: vertex.index, direction, ng, raw, edge: vertex.edge });
+        }
     }
 
     /// Adds the light of a hit.
@@ -286,7 +309,8 @@ impl<'a> Gather<'a> {
             1.0
         } else {
             let next_event = next_event_pdf(self.scene, light, edge, self.normal_before, ng, direction);
-            self.rules.heuristic.weight(edge.pdf_with_survival(), next_event)
+            let walked = SolidAnglePdf(edge.pdf_with_survival().0 * edge.transmittance.share());
+            self.rules.heuristic.weight(walked, next_event)
         };
         self.record((0, index as usize + 1), raw, weight, true);
         self.samples.add(ContributionKind::Hit, self.pixel, raw * weight);
@@ -313,12 +337,7 @@ impl WalkHooks for Gather<'_> {
         if let Some(replay) = &mut self.replay {
             replay.vertex(SubpathKind::Eye, scene, vertex);
         }
-        if !self.hidden(index)
-            && let Some((light, emitted)) = emitted_at(scene, vertex)
-        {
-            let (direction, raw, ng) = (-vertex.wo, vertex.throughput * emitted, vertex.place.normal());
-            self.hit(&EmitterHit { light, index, direction, ng, raw, edge: vertex.edge });
-        }
+        self.emission(vertex);
         if vertex.scatter.is_black() {
             return false;
         }
@@ -330,6 +349,10 @@ impl WalkHooks for Gather<'_> {
             });
         }
         true
+    }
+
+    fn passing(&mut self, vertex: &Vertex) {
+        self.emission(vertex);
     }
 
     fn escaped(&mut self, index: u32, direction: Vec3, throughput: Rgb, edge: &Edge) {

@@ -91,7 +91,7 @@ impl CacheFactor for RisFactor {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CacheVisibility {
     near: NearestCaches,
-    /// Bit i set: nothing is between cache point i and the light vertex.
+    /// Bit i set: light of the light vertex reaches cache point i.
     mask: u16,
 }
 
@@ -121,10 +121,7 @@ impl CacheFactor for PerCacheFactor {
                 packet.push(&segment(points.end(cache), y));
             }
         }
-        lookup.mask = match packet.len {
-            0 => 0,
-            _ => !tracer.occluded_packet(&packet, RayKind::ShadowWeight),
-        };
+        lookup.mask = tracer.visible_packet(&packet, RayKind::ShadowWeight);
     }
 
     fn edge(

@@ -26,7 +26,7 @@ use crate::math::cdf::CdfRows;
 use crate::math::hash::HashRng;
 use crate::path::{Iteration, ShadowQueue, streams};
 use crate::ray::offset::segment;
-use crate::ray::{RayKind, RayStats, Tracer};
+use crate::ray::{RayKind, RayStats, Tracer, Transmittance};
 use crate::spatial::light_tree::{Aabb, CutLimits, CutScratch, ReceiverBounds};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -71,6 +71,12 @@ struct UnshadowedLight {
 }
 
 impl UnshadowedLight {
+    /// The light behind the masks on the way.
+    #[inline]
+    fn through(self, transmittance: Transmittance) -> UnshadowedLight {
+        UnshadowedLight { full: self.full * transmittance.share(), ..self }
+    }
+
     /// Adds it to the light by cache point and entry, and to the cache points that see the entry.
     #[inline]
     fn add_to(self, light: &mut [f32], seen: &mut [u16]) {
@@ -220,13 +226,20 @@ impl GroupPmf {
                 if full > 0.0 && full.is_finite() {
                     let unshadowed = UnshadowedLight { entry: e as u32, cache: c as u32, full };
                     let seen = &mut self.seen;
-                    queue.push(&segment(caches.end(group.start + c), &end), unshadowed, tracer, |arriving, _| {
-                        arriving.add_to(light, seen);
-                    });
+                    queue.push(
+                        &segment(caches.end(group.start + c), &end),
+                        unshadowed,
+                        tracer,
+                        |arriving, transmittance| {
+                            arriving.through(transmittance).add_to(light, seen);
+                        },
+                    );
                 }
             }
         }
-        queue.flush(tracer, |arriving, _| arriving.add_to(light, &mut self.seen));
+        queue.flush(tracer, |arriving, transmittance| {
+            arriving.through(transmittance).add_to(light, &mut self.seen);
+        });
     }
 
     /// Multiplies the light of every entry by the share that the surface at the cache point scatters to the eye.

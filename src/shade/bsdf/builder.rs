@@ -67,7 +67,7 @@ impl<'a> Builder<'a> {
         let depth = depth + 1;
         match &desc.kind {
             BsdfKind::Model(desc) => self.model(desc),
-            BsdfKind::Null => Ok(Subtree::leaf(Node::Null, Features::hole())),
+            BsdfKind::Null => Ok(Subtree { lobes: 0, ..Subtree::leaf(Node::Null, Features::hole()) }),
             BsdfKind::TwoSided { front, back } => two_sided(self.subtree(*front, depth)?, self.subtree(*back, depth)?),
             BsdfKind::Mask { nested, opacity } => {
                 let nested = self.subtree(*nested, depth)?;
@@ -110,7 +110,7 @@ impl<'a> Builder<'a> {
         let (opacity, textured) = self.scalar(opacity);
         Subtree {
             features: nested.features.union(Features::hole()).union(textured),
-            lobes: nested.lobes + 1,
+            lobes: nested.lobes,
             frames: nested.frames,
             black: false,
             node: Node::Mask { nested: Box::new(nested.node), opacity },

@@ -55,14 +55,7 @@ impl Model for Dielectric {
             let b = Vec3::new(-a.x * inv, -a.y * inv, interface.cos_t).normalize_or(-a);
             let value = transmit * (inv * inv);
             let pdf = 1.0 - p;
-            Some(LobeSample::Delta(DeltaSample {
-                b,
-                value,
-                pdf,
-                pdf_reverse: pdf,
-                eta: interface.eta,
-                passes_through: false,
-            }))
+            Some(LobeSample::Delta(DeltaSample { b, value, pdf, pdf_reverse: pdf, eta: interface.eta }))
         }
     }
 
@@ -124,7 +117,7 @@ impl Model for ThinDielectric {
             Some(LobeSample::Delta(mirror(a, reflect, p)))
         } else {
             let pdf = 1.0 - p;
-            let event = DeltaSample { b: -a, value: transmit, pdf, pdf_reverse: pdf, eta: 1.0, passes_through: false };
+            let event = DeltaSample { b: -a, value: transmit, pdf, pdf_reverse: pdf, eta: 1.0 };
             Some(LobeSample::Delta(event))
         }
     }
@@ -142,5 +135,5 @@ impl Model for ThinDielectric {
 
 /// Mirror reflection with the same probability in both directions.
 pub(super) fn mirror(a: Vec3, value: Rgb, pdf: f32) -> DeltaSample {
-    DeltaSample { b: Vec3::new(-a.x, -a.y, a.z), value, pdf, pdf_reverse: pdf, eta: 1.0, passes_through: false }
+    DeltaSample { b: Vec3::new(-a.x, -a.y, a.z), value, pdf, pdf_reverse: pdf, eta: 1.0 }
 }

@@ -5,7 +5,7 @@
 pub struct Features {
     /// Some parameter comes from a texture.
     pub textured: bool,
-    /// Some lobe has discrete directions (mirrors, glass, masks).
+    /// Some lobe has discrete directions (mirrors, glass).
     pub delta: bool,
     /// Some lobe has a density, and is so narrow that connections hardly ever meet it.
     pub nearly_specular: bool,
@@ -13,7 +13,7 @@ pub struct Features {
     pub smooth: bool,
     /// Light crosses the surface and is refracted or passes a pane.
     pub transmissive: bool,
-    /// Light may go straight on as if there were no surface (mask, null).
+    /// Light may go straight on as if there were no surface (mask, null): there are points with holes.
     pub passes_through: bool,
     /// Some lobe changes the direction of light, or absorbs it.
     pub scatters: bool,
@@ -31,14 +31,9 @@ impl Features {
         !self.transmissive && !self.passes_through
     }
 
-    /// All light goes straight on as if there were no surface.
-    pub fn interface(&self) -> bool {
-        self.passes_through && !self.scatters
-    }
-
     /// Features of a surface without effect on light: masks' holes and null.
     pub(super) fn hole() -> Features {
-        Features { delta: true, passes_through: true, two_sided: true, ..Features::default() }
+        Features { passes_through: true, two_sided: true, ..Features::default() }
     }
 
     pub(super) fn union(self, o: Features) -> Features {

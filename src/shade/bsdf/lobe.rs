@@ -6,7 +6,6 @@ use super::dielectric::{Dielectric, ThinDielectric};
 use super::diffuse::Diffuse;
 use super::features::Features;
 use super::model::{LobeSample, Model, TextureBinder, features_of};
-use super::null::Null;
 use super::phong::Phong;
 use super::plastic::Plastic;
 use super::principled::Principled;
@@ -59,8 +58,6 @@ macro_rules! define_lobes {
         #[derive(Clone, Copy, Debug)]
         pub(super) enum Lobe {
             $($Model($Model),)*
-            /// Light goes straight on.
-            Null(Null),
         }
 
         impl Lobe {
@@ -69,7 +66,6 @@ macro_rules! define_lobes {
             pub fn eval_pdf(&self, a: Vec3, b: Vec3) -> (Rgb, f32) {
                 match self {
                     $(Lobe::$Model(lobe) => lobe.eval_pdf(a, b),)*
-                    Lobe::Null(lobe) => lobe.eval_pdf(a, b),
                 }
             }
 
@@ -78,7 +74,6 @@ macro_rules! define_lobes {
             pub fn pdf(&self, a: Vec3, b: Vec3) -> f32 {
                 match self {
                     $(Lobe::$Model(lobe) => lobe.pdf(a, b),)*
-                    Lobe::Null(lobe) => lobe.pdf(a, b),
                 }
             }
 
@@ -86,7 +81,6 @@ macro_rules! define_lobes {
             pub fn sample(&self, a: Vec3, u: [f32; 3]) -> Option<LobeSample> {
                 match self {
                     $(Lobe::$Model(lobe) => lobe.sample(a, u),)*
-                    Lobe::Null(lobe) => lobe.sample(a, u),
                 }
             }
 
@@ -94,7 +88,6 @@ macro_rules! define_lobes {
             pub fn albedo(&self) -> Rgb {
                 let albedo = match self {
                     $(Lobe::$Model(lobe) => lobe.albedo(),)*
-                    Lobe::Null(lobe) => lobe.albedo(),
                 };
                 albedo.map(|c| c.clamp(0.0, 1.0))
             }
@@ -103,7 +96,6 @@ macro_rules! define_lobes {
             pub fn is_smooth(&self) -> bool {
                 match self {
                     $(Lobe::$Model(_) => $Model::SMOOTH,)*
-                    Lobe::Null(_) => Null::SMOOTH,
                 }
             }
 
@@ -113,7 +105,6 @@ macro_rules! define_lobes {
             pub fn eta(&self) -> f32 {
                 match self {
                     $(Lobe::$Model(lobe) => lobe.eta(),)*
-                    Lobe::Null(lobe) => lobe.eta(),
                 }
             }
 
@@ -121,7 +112,6 @@ macro_rules! define_lobes {
             pub fn is_one_sided(&self) -> bool {
                 match self {
                     $(Lobe::$Model(lobe) => lobe.is_one_sided(),)*
-                    Lobe::Null(lobe) => lobe.is_one_sided(),
                 }
             }
         }

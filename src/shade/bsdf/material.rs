@@ -51,7 +51,14 @@ impl Material {
         Material::new(Subtree::leaf(Node::lambertian(Rgb::grey(0.5)), features))
     }
 
-    /// Looks up every texture at `point` for a walk that arrived from `wo`.
+    /// The share of light that goes straight through at `point`, as if there were no surface, in [0, 1].
+    #[inline]
+    pub fn holes(&self, point: &SurfacePoint) -> f32 {
+        if self.features.passes_through { self.node.holes(point) } else { 0.0 }
+    }
+
+    /// Looks up every texture at `point` for a walk that arrived from `wo`. The BSDF is that of the surface between its
+    /// holes: of a mask, the one that it covers.
     #[inline]
     pub fn resolve(&self, point: &SurfacePoint, wo: Vec3) -> Bsdf {
         let mut bsdf = Bsdf::empty(point);
@@ -75,7 +82,11 @@ impl Material {
     fn resolve_general(&self, bsdf: &mut Bsdf, point: &SurfacePoint, wo: Vec3) {
         if !self.features.opaque() {
             bsdf.begin(point, Scattering::Lobes(LobeSum::new(point.frame)));
-            return Resolver { point, only_side: None, bsdf }.root(&self.node);
+            let weight = if self.features.passes_through { 1.0 / (1.0 - self.holes(point)) } else { 1.0 };
+            if weight.is_finite() {
+                Resolver { point, only_side: None, bsdf }.root(&self.node, weight);
+            }
+            return;
         }
         let side = self.node.visible_side(wo.dot(point.frame.n) <= 0.0);
         let n = point.frame.n * side.normal_sign;
@@ -86,7 +97,7 @@ impl Material {
             return;
         }
         bsdf.begin(point, Scattering::Lobes(LobeSum::new(Frame { n, ..point.frame })));
-        Resolver { point, only_side: Some(usize::from(side.from_back)), bsdf }.root(side.node);
+        Resolver { point, only_side: Some(usize::from(side.from_back)), bsdf }.root(side.node, 1.0);
     }
 
     /// Properties that hold at every point.

@@ -17,7 +17,6 @@ mod microfacet;
 mod model;
 mod nested_frame;
 mod node;
-mod null;
 mod phong;
 mod plastic;
 mod principled;
@@ -60,8 +59,6 @@ pub struct BsdfSample {
     pub reverse_delta: Rgb,
     /// The direction is one of finitely many.
     pub delta: bool,
-    /// The ray goes straight through as if there were no surface (mask, null).
-    pub passes_through: bool,
     /// Relative refractive index crossed: transmitted side / incident side; 1 for reflection.
     pub eta: f32,
 }

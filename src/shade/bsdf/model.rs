@@ -171,8 +171,6 @@ pub(super) struct DeltaSample {
     pub pdf_reverse: f32,
     /// Index of the side of `b` / index of the side of `a`.
     pub eta: f32,
-    /// The light goes straight on as if there were no surface.
-    pub passes_through: bool,
 }
 
 /// Splits off the choice of one of two events: true with probability `p`, and what remains of `u` to draw from again.

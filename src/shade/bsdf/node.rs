@@ -4,7 +4,6 @@ use super::Bsdf;
 use super::diffuse::Diffuse;
 use super::lobe::{Lobe, TexturedModel};
 use super::nested_frame::{NestedFrame, ROOT, Step, tilted_frame};
-use super::null::Null;
 use super::view::WeightedLobe;
 use crate::math::{Frame, Rgb, Vec3};
 use crate::scene::DiffuseParams;
@@ -16,11 +15,30 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) enum Node {
     Model(TexturedModel),
-    TwoSided { front: Box<Node>, back: Box<Node> },
-    Mask { nested: Box<Node>, opacity: ScalarTexture },
-    BumpMap { nested: Box<Node>, height: Arc<Texture>, scale: f32 },
-    NormalMap { nested: Box<Node>, normals: Arc<Texture> },
-    Blend { weight: ScalarTexture, a: Box<Node>, b: Box<Node> },
+    TwoSided {
+        front: Box<Node>,
+        back: Box<Node>,
+    },
+    /// A surface with holes.
+    Mask {
+        nested: Box<Node>,
+        opacity: ScalarTexture,
+    },
+    BumpMap {
+        nested: Box<Node>,
+        height: Arc<Texture>,
+        scale: f32,
+    },
+    NormalMap {
+        nested: Box<Node>,
+        normals: Arc<Texture>,
+    },
+    Blend {
+        weight: ScalarTexture,
+        a: Box<Node>,
+        b: Box<Node>,
+    },
+    /// No surface.
     Null,
 }
 
@@ -49,6 +67,25 @@ impl Node {
     /// A diffuse surface of constant albedo.
     pub fn lambertian(reflectance: Rgb) -> Node {
         Node::Model(TexturedModel::Diffuse(DiffuseParams { reflectance: ColorTexture::Constant(reflectance) }))
+    }
+
+    /// The share of light that goes straight through at `point`, in [0, 1]. It is the same from either side: a two-sided
+    /// material has the holes that both of its sides have.
+    pub fn holes(&self, point: &SurfacePoint) -> f32 {
+        match self {
+            Node::Null => 1.0,
+            Node::Model(_) => 0.0,
+            Node::TwoSided { front, back } => front.holes(point).min(back.holes(point)),
+            Node::BumpMap { nested, .. } | Node::NormalMap { nested, .. } => nested.holes(point),
+            Node::Mask { nested, opacity } => {
+                let opacity = opacity.eval(point).clamp(0.0, 1.0);
+                (1.0 - opacity) + opacity * nested.holes(point)
+            }
+            Node::Blend { weight, a, b } => {
+                let weight = weight.eval(point).clamp(0.0, 1.0);
+                (1.0 - weight) * a.holes(point) + weight * b.holes(point)
+            }
+        }
     }
 
     /// The front or back of an opaque material. The commonest nesting, two-sided at the root, needs no frame of its
@@ -87,14 +124,14 @@ pub(super) struct Resolver<'a> {
 }
 
 impl Resolver<'_> {
-    /// Adds the lobes of a whole material and normalises the choice between them.
-    pub fn root(mut self, node: &Node) {
+    /// Adds the lobes of a whole material, times `weight`, and normalises the choice between them.
+    pub fn root(mut self, node: &Node, weight: f32) {
         let active = match self.only_side {
             None => [true; 2],
             Some(s) => [s == 0, s == 1],
         };
         let frame = self.point.frame;
-        self.visit(node, Context { weight: 1.0, frame_index: ROOT, active, mirrored: false, frame });
+        self.visit(node, Context { weight, frame_index: ROOT, active, mirrored: false, frame });
         self.bsdf.normalise_selection();
     }
 
@@ -104,12 +141,11 @@ impl Resolver<'_> {
         }
         match node {
             Node::Model(model) => self.push_lobe(model.at(self.point), at),
-            Node::Null => self.push_lobe(Lobe::Null(Null), at),
+            Node::Null => {}
             Node::TwoSided { front, back } => self.two_sided(front, back, at),
             Node::Mask { nested, opacity } => {
                 let opacity = opacity.eval(self.point).clamp(0.0, 1.0);
                 self.visit(nested, Context { weight: at.weight * opacity, ..at });
-                self.visit(&Node::Null, Context { weight: at.weight * (1.0 - opacity), ..at });
             }
             Node::Blend { weight, a, b } => {
                 let weight = weight.eval(self.point).clamp(0.0, 1.0);

@@ -182,7 +182,6 @@ impl BsdfView<'_> {
             pdf_reverse_delta: SolidAnglePdf(0.0),
             reverse_delta: Rgb::BLACK,
             delta: false,
-            passes_through: false,
             eta,
         })
     }
@@ -228,25 +227,21 @@ impl BsdfView<'_> {
     fn delta_sample(&self, sum: &LobeSum, wo: Vec3, event: &DeltaEvent, mode: Transport) -> Option<BsdfSample> {
         let DeltaEvent { selected: SelectedLobe { lobe, probability, .. }, frame, a, sample } = event;
         let (o, i) = (sum.frame.to_local(wo), frame.to_world(sample.b));
-        let wi = if sample.passes_through { -wo } else { sum.frame.to_world(i).normalize() };
-        let mut value = sample.value * lobe.weight;
-        let mut reverse_value = value;
-        if !sample.passes_through {
-            let local = match mode {
-                Transport::Radiance => nested_frame::enter(self.frames, lobe.frame, o, i)?,
-                Transport::Importance => nested_frame::enter(self.frames, lobe.frame, i, o)?,
-            };
-            value *= local.shadowing;
-            // Walked from `wi` to `wo`: no η², and the cosines exchanged.
-            let cosines = self.geometric_ratio(wi, wo) * sample.b.z.abs() / a.z.abs();
-            reverse_value = value * (sample.eta * sample.eta * cosines);
-            if mode == Transport::Importance {
-                let cos = sample.b.z.abs();
-                if cos == 0.0 {
-                    return None;
-                }
-                value *= sample.eta * sample.eta * self.geometric_ratio(wo, wi) * a.z.abs() / cos;
+        let wi = sum.frame.to_world(i).normalize();
+        let local = match mode {
+            Transport::Radiance => nested_frame::enter(self.frames, lobe.frame, o, i)?,
+            Transport::Importance => nested_frame::enter(self.frames, lobe.frame, i, o)?,
+        };
+        let mut value = sample.value * lobe.weight * local.shadowing;
+        // Walked from `wi` to `wo`: no η², and the cosines exchanged.
+        let cosines = self.geometric_ratio(wi, wo) * sample.b.z.abs() / a.z.abs();
+        let reverse_value = value * (sample.eta * sample.eta * cosines);
+        if mode == Transport::Importance {
+            let cos = sample.b.z.abs();
+            if cos == 0.0 {
+                return None;
             }
+            value *= sample.eta * sample.eta * self.geometric_ratio(wo, wi) * a.z.abs() / cos;
         }
         let back = side_index(i.z);
         let reverse_probability =
@@ -258,7 +253,6 @@ impl BsdfView<'_> {
             pdf_reverse_delta: SolidAnglePdf(reverse_probability * sample.pdf_reverse),
             reverse_delta: reverse_value,
             delta: true,
-            passes_through: sample.passes_through,
             eta: sample.eta,
         })
     }

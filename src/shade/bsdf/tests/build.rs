@@ -149,23 +149,32 @@ fn backs_are_black_unless_two_sided() {
 }
 
 #[test]
-fn masks_and_null_let_light_straight_through() {
-    let wo = Vec3::new(0.3, 0.1, 0.8).normalize();
-    let mut rng = HashRng::new(1, 0, 0, 0);
-    for (name, share) in [("null", 1.0f32), ("mask", 0.6)] {
-        for mode in [Transport::Radiance, Transport::Importance] {
-            let bsdf = ZOO.get(name).resolve(&leaning(), wo);
-            let through = (0..4000).filter_map(|_| bsdf.sample(wo, next3(&mut rng), mode)).filter(|s| s.passes_through);
-            let sum: f32 = through
-                .map(|s| {
-                    assert!(s.wi == -wo && s.eta == 1.0 && s.delta);
-                    s.value.g / s.pdf.0
-                })
-                .sum();
-            // Standard error below 0.02.
-            assert!((sum / 4000.0 - share).abs() < 0.08, "{name} {sum}");
-        }
+fn holes_let_light_through_and_the_rest_is_the_nested_material() {
+    let (wo, wi) = (Vec3::new(0.3, 0.1, 0.8).normalize(), Vec3::new(-0.2, 0.4, 0.7).normalize());
+    let holes = |name: &str| ZOO.get(name).holes(&leaning());
+    for (name, share) in
+        [("null", 1.0), ("mask", 0.6), ("mask_two_sided", 0.3), ("blend_mask", 0.25 * 0.6), ("two_sided", 0.0)]
+    {
+        assert!((holes(name) - share).abs() < 1e-6, "{name} {}", holes(name));
     }
+    // A mask of 0.7 over a two-sided material: what is no hole is that material.
+    let [masked, nested] = ["mask_two_sided", "two_sided"].map(|name| ZOO.get(name).resolve(&leaning(), wo));
+    let [(a, p), (b, q)] = [&masked, &nested].map(|bsdf| bsdf.eval_and_pdf(wo, wi, Transport::Radiance));
+    assert!((a.g - b.g).abs() < 1e-6 && (p.0 - q.0).abs() < 1e-6 && b.g > 0.0);
+    assert!(ZOO.get("null").resolve(&leaning(), wo).is_black());
+    let features = |name: &str| ZOO.get(name).features();
+    assert!(!features("mask").delta && features("mask_two_sided").delta && !features("null").scatters);
+}
+
+/// Sides with different holes: light meets the same holes from either side.
+#[test]
+fn two_sided_materials_have_the_holes_of_both_sides() {
+    let mask = |opacity: f32| BsdfKind::Mask { nested: BsdfId(0), opacity: num(opacity) };
+    let of = |front: u32, back: u32| BsdfKind::TwoSided { front: BsdfId(front), back: BsdfId(back) };
+    let (set, messages) = messages(vec![grey(), mask(0.3), mask(0.8), of(1, 2), of(1, 0)]);
+    assert!(messages.is_empty(), "{messages:?}");
+    let holes = |i: u32| set.get(Some(BsdfId(i))).holes(&flat());
+    assert!((holes(3) - 0.2).abs() < 1e-6 && holes(4) == 0.0);
 }
 
 #[test]

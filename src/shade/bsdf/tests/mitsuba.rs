@@ -27,6 +27,8 @@ fn values_and_densities_agree() {
         for ((wo, wi), (value, pdf)) in PAIRS.iter().zip(*rows) {
             let (wo, wi) = (Vec3::from(*wo).normalize(), Vec3::from(*wi).normalize());
             let (got, density) = material.resolve(&flat(), wo).eval_and_pdf(wo, wi, Transport::Radiance);
+            // Values of a mask count its opacity in Mitsuba.
+            let got = got * (1.0 - material.holes(&flat()));
             let close = |a: f32, b: f32, tolerance: f32| (a - b).abs() <= tolerance * b.abs() + 1e-7;
             if (0..3).any(|c| !close(got[c], value[c], 1e-3)) {
                 worst += &format!("\n{name} value {wo} {wi}: {got:?}, Mitsuba {value:?}");
