@@ -6,6 +6,7 @@ use super::config::plain_options;
 use super::environment::Environment;
 use super::skeleton;
 use crate::image::{OutputFormat, Pixels};
+use crate::integrators;
 use crate::prepared::PreparedScene;
 use crate::render::{OutputFiles, job};
 use crate::scene::SceneDesc;
@@ -35,8 +36,13 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     outputs.check_inputs(loaded.desc.files.iter().map(PathBuf::as_path))?;
     out!("scene       {}", args.scene.scene.display());
     describe_file(&loaded.desc);
+    let named = loaded.desc.integrator.as_ref().and_then(|block| integrators::find(&block.name));
     let scene = job::prepare(loaded, &plain_options(&environment), environment.runtime())?.scene;
     describe_prepared(&scene);
+    let integrator = named.unwrap_or(&integrators::path::SPEC);
+    if let Some(limitation) = (integrator.limitations)(scene.features) {
+        out!("missing     {}: {limitation}", integrator.name);
+    }
     if args.skeleton.is_some() || args.skeleton_image.is_some() {
         write_skeleton(args, &scene)?;
     }

@@ -40,7 +40,13 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
         chapter 9 and section 10.2.",
     params: &[&[MAX_DEPTH, RR_DEPTH_UNIDIRECTIONAL, HIDE_EMITTERS, heuristic("power")]],
     unbiased: true,
-    limitations: |_| None,
+    limitations: |features| {
+        PathTracer::is_blind(features).then(|| {
+            "light of point, spot and directional lights that comes by way of mirrors or through glass is missing: these \
+            lights are found by connections alone, which mirrors and glass block"
+                .into()
+        })
+    },
     build: |params| Box::new(PathTracer::new(params)),
 };
 
