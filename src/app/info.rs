@@ -7,6 +7,7 @@ use super::environment::Environment;
 use super::skeleton;
 use crate::image::{OutputFormat, Pixels};
 use crate::integrators;
+use crate::math::DVec3;
 use crate::prepared::PreparedScene;
 use crate::render::{OutputFiles, job};
 use crate::scene::SceneDesc;
@@ -89,7 +90,12 @@ fn describe_prepared(scene: &PreparedScene) {
         out!("round       {} spheres, disks and cylinders", scene.geometry.round_count());
     }
     out!("lights      {} (every emitting triangle is one)", scene.lights.len());
-    out!("radius      {:.4}, centre {:.4} {:.4} {:.4}", scene.radius, scene.centre.x, scene.centre.y, scene.centre.z);
+    let (radius, DVec3 { x, y, z }) = (f64::from(scene.radius) * scene.unit, scene.centre);
+    if scene.unit == 1.0 {
+        out!("radius      {radius:.4}, centre {x:.4} {y:.4} {z:.4}");
+    } else {
+        out!("radius      {radius:.4e}, centre {x:.4e} {y:.4e} {z:.4e}");
+    }
     out!("features    {}", scene.features.names().join(", "));
     out!("backend     {}, tree built in {:.3} s", scene.query.describe(), scene.tree_seconds);
 }
@@ -107,7 +113,7 @@ fn write_skeleton(args: &InfoArgs, scene: &PreparedScene) -> Result<(), Failure>
         mib(made.map_bytes())
     );
     if let Some(path) = &args.skeleton {
-        skeleton::write_lines(path, &made, scene.centre)?;
+        skeleton::write_lines(path, &made, scene)?;
     }
     if let Some(path) = &args.skeleton_image {
         skeleton::write_image(path, scene, &made)?;

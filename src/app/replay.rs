@@ -5,7 +5,8 @@ use super::cli::ReplayArgs;
 use super::environment::Environment;
 use crate::integrators::Iteration;
 use crate::integrators::replay::{ContributionRecord, Replay, VertexRecord};
-use crate::math::{DVec3, Rgb, Vec3};
+use crate::math::{Rgb, Vec3};
+use crate::prepared::PreparedScene;
 use crate::render::job;
 
 pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
@@ -24,7 +25,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     let iteration = Iteration::new(scene, args.sample.seed, args.iteration);
     let replay = environment.pool.install(|| method.build().replay(&iteration, (x, y)));
     out!("{} pixel {x},{y} iteration {} seed {}", method.spec.name, args.iteration, args.sample.seed);
-    print(&replay, scene.centre);
+    print(&replay, scene);
     Ok(())
 }
 
@@ -32,16 +33,20 @@ fn rgb(c: Rgb) -> String {
     format!("({:.6e} {:.6e} {:.6e})", c.r, c.g, c.b)
 }
 
-fn point(p: Vec3, centre: DVec3) -> String {
-    let p = p.as_dvec3() + centre;
-    format!("({:.6} {:.6} {:.6})", p.x, p.y, p.z)
+fn point(p: Vec3, scene: &PreparedScene) -> String {
+    let p = scene.position_in_file(p);
+    if scene.unit == 1.0 {
+        format!("({:.6} {:.6} {:.6})", p.x, p.y, p.z)
+    } else {
+        format!("({:.6e} {:.6e} {:.6e})", p.x, p.y, p.z)
+    }
 }
 
-fn print(replay: &Replay, centre: DVec3) {
+fn print(replay: &Replay, scene: &PreparedScene) {
     for (name, letter, walk) in [("eye", 'z', &replay.eye), ("light", 'y', &replay.light)] {
         out!("\n{name} sub-path: {} surface vertices", walk.len());
         for (i, v) in walk.iter().enumerate() {
-            vertex(letter, i + 1, v, centre);
+            vertex(letter, i + 1, v, scene);
         }
     }
     out!("\n{} contributions (light vertices s, eye vertices t)", replay.contributions.len());
@@ -55,12 +60,12 @@ fn print(replay: &Replay, centre: DVec3) {
     out!("\nsum of what is visible in this pixel: {}", rgb(sum));
 }
 
-fn vertex(letter: char, i: usize, v: &VertexRecord, centre: DVec3) {
+fn vertex(letter: char, i: usize, v: &VertexRecord, scene: &PreparedScene) {
     let p = &v.interior.point;
-    out!("  {letter}{i} at {}  normal {:.4}  shading normal {:.4}", point(p.p, centre), p.ng, p.frame.n);
+    out!("  {letter}{i} at {}  normal {:.4}  shading normal {:.4}", point(p.p, scene), p.ng, p.frame.n);
     out!(
         "     edge {:.6e} long, pdf {:.6e} /sr, survival {:.4}, cos {:.4}; throughput {}; albedo {}{}",
-        v.distance,
+        f64::from(v.distance) * scene.unit,
         v.pdf.0,
         v.survival,
         p.ng.dot(v.wo),

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use crate::image::{Layer, Picture, atomic_write, write_picture};
-use crate::math::{DVec3, Rgb, Vec3, hash::mix64};
+use crate::math::{Rgb, Vec3, hash::mix64};
 use crate::prepared::PreparedScene;
 use crate::ray::Ray;
 use crate::skeleton::Skeleton;
@@ -35,17 +35,17 @@ impl LineFormat {
 }
 
 /// Writes nodes (with their radii in PLY) and edges in the coordinates of the scene file.
-pub(crate) fn write_lines(path: &Path, skeleton: &Skeleton, centre: DVec3) -> Result<(), Failure> {
+pub(crate) fn write_lines(path: &Path, skeleton: &Skeleton, scene: &PreparedScene) -> Result<(), Failure> {
     let format = LineFormat::of(path)?;
     let text = match format {
-        LineFormat::Ply => ply(skeleton, centre),
-        LineFormat::Obj => obj(skeleton, centre),
+        LineFormat::Ply => ply(skeleton, scene),
+        LineFormat::Obj => obj(skeleton, scene),
     };
     atomic_write(path, |w: &mut dyn Write| -> io::Result<()> { w.write_all(text.as_bytes()) })
         .map_err(|e| Failure::Io(format!("{}: cannot be written: {e}", path.display())))
 }
 
-fn ply(skeleton: &Skeleton, centre: DVec3) -> String {
+fn ply(skeleton: &Skeleton, scene: &PreparedScene) -> String {
     let mut text = format!(
         "ply\nformat ascii 1.0\ncomment nodes and edges of a skeleton of empty space\n\
          element vertex {}\nproperty double x\nproperty double y\nproperty double z\nproperty float radius\n\
@@ -54,8 +54,8 @@ fn ply(skeleton: &Skeleton, centre: DVec3) -> String {
         skeleton.edges.len()
     );
     for node in &skeleton.nodes {
-        let p = node.position.as_dvec3() + centre;
-        text += &format!("{} {} {} {}\n", p.x, p.y, p.z, node.radius);
+        let p = scene.position_in_file(node.position);
+        text += &format!("{} {} {} {}\n", p.x, p.y, p.z, f64::from(node.radius) * scene.unit);
     }
     for [a, b] in &skeleton.edges {
         text += &format!("{a} {b}\n");
@@ -63,10 +63,10 @@ fn ply(skeleton: &Skeleton, centre: DVec3) -> String {
     text
 }
 
-fn obj(skeleton: &Skeleton, centre: DVec3) -> String {
+fn obj(skeleton: &Skeleton, scene: &PreparedScene) -> String {
     let mut text = String::from("# nodes and edges of a skeleton of empty space\n");
     for node in &skeleton.nodes {
-        let p = node.position.as_dvec3() + centre;
+        let p = scene.position_in_file(node.position);
         text += &format!("v {} {} {}\n", p.x, p.y, p.z);
     }
     for [a, b] in &skeleton.edges {

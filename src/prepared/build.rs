@@ -3,10 +3,11 @@
 use super::coplanar::raise_emitters;
 use super::lights::{Extent, all_lights};
 use super::limits::{MAX_REACH, check_instances};
-use super::placing::{PlacedScene, centre};
+use super::placing::{PlacedScene, bounds};
+use super::units::to_usual_size;
 use super::{Features, MeshShading, PreparedScene, TriangleTable};
 use crate::emit::{Camera, EmitError, Light, LightSet, PixelFilter};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::ray::{Backend, QueryError, SurfaceMask};
 use crate::scene::{Diagnostics, SceneDesc, SensorDesc};
 use crate::shade::{MaterialSet, TextureSet};
@@ -62,6 +63,7 @@ impl PreparedScene {
         options: &PrepareOptions,
         diagnostics: &mut Diagnostics,
     ) -> Result<PreparedScene, PrepareError> {
+        let unit = to_usual_size(&mut desc);
         let mut sensor = desc.sensors.first().cloned().ok_or(PrepareError::NoCamera)?;
         if let Some([width, height]) = options.size {
             (sensor.film.width, sensor.film.height, sensor.film.crop) = (width, height, None);
@@ -76,7 +78,7 @@ impl PreparedScene {
             return Err(PrepareError::Materials);
         }
 
-        let centre = centre(&desc);
+        let centre = bounds(&desc).map_or(DVec3::ZERO, |(lo, hi)| 0.5 * (lo + hi));
         let mut placed = PlacedScene::new(&mut desc, centre, &materials, diagnostics);
         raise_emitters(&mut placed, diagnostics);
         let (lo, hi) = placed.geometry.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
@@ -104,7 +106,8 @@ impl PreparedScene {
             filter: PixelFilter::new(sensor.film.filter),
             film_size,
             window,
-            centre,
+            centre: centre * unit,
+            unit,
             radius,
             features,
             tree_seconds: start.elapsed().as_secs_f64(),

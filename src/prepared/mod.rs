@@ -14,6 +14,7 @@ mod limits;
 pub mod mesh;
 mod placing;
 pub mod triangles;
+mod units;
 
 pub use build::{PrepareError, PrepareOptions};
 pub use features::Features;
@@ -52,8 +53,10 @@ pub struct PreparedScene {
     pub film_size: [u32; 2],
     /// The part to render, in pixels of the full picture: x, y, width, height.
     pub window: [u32; 4],
-    /// The world position that is the origin here.
+    /// The position in the file that is the origin here.
     pub centre: DVec3,
+    /// The length in units of the file that is 1 here; 1 unless the scene is very small or very large.
+    pub unit: f64,
     /// Radius of a sphere around the origin that holds every surface.
     pub radius: f32,
     /// Features of the scene.
@@ -63,6 +66,11 @@ pub struct PreparedScene {
 }
 
 impl PreparedScene {
+    /// The position in the file of the point `p`.
+    pub fn position_in_file(&self, p: Vec3) -> DVec3 {
+        p.as_dvec3() * self.unit + self.centre
+    }
+
     /// Everything that shading needs of a hit.
     #[inline]
     pub fn surface_point(&self, hit: &Hit) -> (SurfacePoint, &Material) {

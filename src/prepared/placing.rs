@@ -5,8 +5,8 @@ use super::MeshShading;
 use crate::math::{DVec3, Vec3};
 use crate::ray::{Geometry, Instance, MeshBuffers, RoundShape, SurfaceMask, VertexBuffer};
 use crate::scene::{
-    AreaEmission, BsdfId, ColorDesc, Diagnostic, Diagnostics, MeshDesc, MeshId, RoundKind, SceneDesc, ShapeDesc,
-    ShapeGeometry,
+    AreaEmission, BsdfId, ColorDesc, Diagnostic, Diagnostics, InstanceDesc, MeshDesc, MeshId, RoundKind, SceneDesc,
+    ShapeDesc, ShapeGeometry,
 };
 use crate::shade::MaterialSet;
 use glam::{Affine3A, DMat3, DMat4, Mat3A};
@@ -74,12 +74,22 @@ fn warn_of_flat_triangles(removed: Vec<(String, usize)>, diagnostics: &mut Diagn
     }
 }
 
-/// Centre of the box around everything, in double precision.
-pub(super) fn centre(desc: &SceneDesc) -> DVec3 {
+/// Box around everything, in double precision; `None` if nothing is there.
+pub(super) fn bounds(desc: &SceneDesc) -> Option<(DVec3, DVec3)> {
+    let group = |i: &InstanceDesc| desc.groups.get(i.group.index()).map_or(&[][..], |g| &g.shapes);
+    let instanced = desc.instances.iter().flat_map(|i| group(i).iter().map(|shape| (shape, i.to_world)));
+    bounds_of(desc, desc.shapes.iter().map(|shape| (shape, DMat4::IDENTITY)).chain(instanced))
+}
+
+/// Box around shapes that are placed by the maps beside them.
+pub(super) fn bounds_of<'a>(
+    desc: &SceneDesc,
+    shapes: impl Iterator<Item = (&'a ShapeDesc, DMat4)>,
+) -> Option<(DVec3, DVec3)> {
     let mut bounds: Option<(DVec3, DVec3)> = None;
-    let mut grow = |shape: &ShapeDesc, outer: DMat4| {
+    for (shape, outer) in shapes {
         // The corners of the object's box bound the placed object; tightness does not matter for a centre.
-        let Some((lo, hi)) = object_box(desc, shape.geometry) else { return };
+        let Some((lo, hi)) = object_box(desc, shape.geometry) else { continue };
         for i in 0..8 {
             let pick = |bit: u32, lo: f32, hi: f32| f64::from(if i >> bit & 1 == 0 { lo } else { hi });
             let corner = DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z));
@@ -89,16 +99,8 @@ pub(super) fn centre(desc: &SceneDesc) -> DVec3 {
                 bounds = Some((lo.min(p), hi.max(p)));
             }
         }
-    };
-    for shape in &desc.shapes {
-        grow(shape, DMat4::IDENTITY);
     }
-    for instance in &desc.instances {
-        for shape in desc.groups.get(instance.group.index()).map_or(&[][..], |g| &g.shapes) {
-            grow(shape, instance.to_world);
-        }
-    }
-    bounds.map_or(DVec3::ZERO, |(lo, hi)| 0.5 * (lo + hi))
+    bounds
 }
 
 /// Box around a shape in its own space; `None` if nothing is there.

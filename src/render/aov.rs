@@ -65,7 +65,8 @@ fn pixel(scene: &PreparedScene, x: u32, y: u32, seed: u64) -> [f32; 7] {
         let Some((hit, point, material)) = first_seen(scene, &ray, &mut tracer, sampler.rng()) else { continue };
         let albedo = material.resolve(&point, -ray.d).albedo();
         let n: Vec3 = point.frame.n;
-        for (s, v) in sum.iter_mut().zip([albedo.r, albedo.g, albedo.b, n.x, n.y, n.z, hit.t]) {
+        let depth = (f64::from(hit.t) * scene.unit) as f32;
+        for (s, v) in sum.iter_mut().zip([albedo.r, albedo.g, albedo.b, n.x, n.y, n.z, depth]) {
             *s += v / RAYS as f32;
         }
     }

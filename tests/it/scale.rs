@@ -3,7 +3,10 @@
 use crate::support::gallery::{GALLERY, exhibit};
 use crate::support::pictures::{Picture, parse, prepare, takes, unbiased};
 use glam::{DMat4, DVec3};
+use lightsieve::integrators::{Params, path};
+use lightsieve::math::Vec3;
 use lightsieve::ray::Backend;
+use lightsieve::render::{Aov, Estimator, aov};
 use lightsieve::scene::{BsdfKind, EmitterKind, SceneDesc};
 
 const SPP: u64 = 32;
@@ -65,6 +68,45 @@ fn size_and_place_do_not_matter() {
     }
 }
 
+/// Sizes at which squares of lengths leave single precision.
+const UNITS: [(f64, DVec3); 2] = [(1e-12, DVec3::new(3e-11, -1e-11, 2e-11)), (1e15, DVec3::new(1e16, 2e16, -3e16))];
+
+#[test]
+fn units_do_not_matter() {
+    for name in ["bumps", "delta-lights", "instances", "lens", "sunsky"] {
+        let here = prepare(exhibit(name), Backend::default_available(), None);
+        for spec in unbiased().filter(|s| ["path", "bdpt"].contains(&s.name) && takes(s, &here)) {
+            let expected = Picture::render(spec, &here, &[], SPP, 1);
+            for (scale, offset) in UNITS {
+                let there = prepare(placed(exhibit(name), scale, offset), Backend::default_available(), None);
+                let picture = Picture::render(spec, &there, &[], SPP, 100);
+                picture.assert_agrees(&expected, 0.0, &format!("{}: {name} x {scale} at {offset}", spec.name));
+            }
+        }
+    }
+}
+
+#[test]
+fn distances_are_in_the_units_of_the_file() {
+    let layer = |scale: f64, offset: DVec3| {
+        let scene = prepare(placed(exhibit("instances"), scale, offset), Backend::default_available(), None);
+        let film = Estimator::new((path::SPEC.build)(&Params::defaults(&path::SPEC)), scene.window, 1).film;
+        let depth = aov::layers(&scene, &film, 1, &[Aov::Depth]).remove(0).channels.remove(0).1;
+        // A corner of the scene's box, in units that do not depend on the scale.
+        let corner = scene.position_in_file(Vec3::splat(scene.radius));
+        (depth, corner, f64::from(scene.radius) * scene.unit)
+    };
+    let (depth, point, radius) = layer(1.0, DVec3::ZERO);
+    assert!(depth.iter().any(|d| *d > 0.1));
+    for (scale, offset) in UNITS {
+        let (there, point_there, radius_there) = layer(scale, offset);
+        let ratios = there.iter().zip(&depth).filter(|(_, d)| **d > 0.0).map(|(a, b)| f64::from(*a) / f64::from(*b));
+        ratios.for_each(|ratio| assert!((ratio / scale - 1.0).abs() < 1e-3, "{ratio:e}"));
+        assert!((radius_there / radius / scale - 1.0).abs() < 1e-3, "{radius_there:e}");
+        assert!(((point_there - offset) / scale).distance(point) < 1e-3 * radius, "{point_there}");
+    }
+}
+
 /// A camera inside a closed, tilted box with balls that touch and pierce its walls; all the light is outside.
 const DARK: &str = r#"
     <sensor type="perspective"><float name="fov" value="90"/>
@@ -94,5 +136,14 @@ fn a_closed_box_is_dark() {
                 assert_eq!(picture.whole.0, 0.0, "{}: {scale} at {offset}, {backend:?}", spec.name);
             }
         }
+    }
+}
+
+#[test]
+fn a_closed_box_is_dark_in_any_unit() {
+    for (scale, offset) in UNITS {
+        let scene = prepare(placed(parse(DARK, &[]), scale, offset), Backend::default_available(), None);
+        let picture = Picture::render(&path::SPEC, &scene, &[], 16, 1);
+        assert_eq!(picture.whole.0, 0.0, "{scale} at {offset}");
     }
 }
