@@ -8,6 +8,8 @@ use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::offset::offset_point;
 use lightsieve::ray::{Backend, MeshBuffers, Ray};
 use lightsieve::scene::RoundKind;
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
 
 const CAMERA: &str = r#"<sensor type="perspective"><film type="hdrfilm"/></sensor>"#;
 const TURNED: &str = r#"<rotate x="0.26726" y="0.53452" z="0.80178" angle="37"/>"#;
@@ -17,8 +19,26 @@ const T_JUNCTION: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\
 /// Rays aimed at the edges of a body.
 const RAYS: u32 = 200_000;
 
+/// A sphere of triangles: 24 slices of 12 rings, with flat normals.
+fn ball() -> String {
+    let (slices, rings) = (24, 12);
+    let vertex = |i: u32| {
+        let (polar, azimuth) =
+            (PI * f64::from(i / slices) / f64::from(rings), TAU * f64::from(i % slices) / f64::from(slices));
+        let ((sin, cos), (s, c)) = (polar.sin_cos(), azimuth.sin_cos());
+        format!("v {} {} {}\n", sin * c, sin * s, cos)
+    };
+    let face = |i: u32| {
+        let next = i / slices * slices + (i + 1) % slices;
+        // Vertices count from 1.
+        format!("f {} {} {} {}\n", i + 1, i + slices + 1, next + slices + 1, next + 1)
+    };
+    (0..(rings + 1) * slices).map(vertex).chain((0..rings * slices).map(face)).collect()
+}
+
 fn body(shapes: &str, backend: Backend) -> PreparedScene {
-    let files = [("cube.obj", T_JUNCTION)];
+    let ball = ball();
+    let files = [("cube.obj", T_JUNCTION), ("ball.obj", ball.as_str())];
     prepare(parse(&format!("{CAMERA}{shapes}<emitter type=\"constant\"/>"), &files), backend, None)
 }
 
@@ -71,10 +91,10 @@ fn tiny(rng: &mut HashRng) -> f32 {
 }
 
 /// Escaped rays: those from the inside to points of edges and corners, and those that leave the points that these meet.
-fn leaks(scene: &PreparedScene, edges: &[[Vec3; 2]]) -> (u32, u32) {
+fn leaks(scene: &PreparedScene, edges: &[[Vec3; 2]], rays: u32) -> (u32, u32) {
     let mut rng = HashRng::new(1, 2, 3, 4);
     let (mut first, mut second) = (0, 0);
-    for i in 0..RAYS {
+    for i in 0..rays {
         let [a, b] = edges[i as usize % edges.len()];
         let [x, y, z, along] = rng.next_4();
         // One in five near a corner.
@@ -96,56 +116,49 @@ fn leaks(scene: &PreparedScene, edges: &[[Vec3; 2]]) -> (u32, u32) {
     (first, second)
 }
 
-#[track_caller]
-fn is_tight(what: &str, shapes: &str) {
-    for backend in [Backend::default_available(), Backend::Obvhs] {
-        let scene = body(shapes, backend);
-        let edges = edges(&scene);
-        let found = leaks(&scene, &edges);
-        assert_eq!(found, (0, 0), "{what}, {backend:?}: rays that miss the edge, rays that leave the point met");
-    }
-}
-
-#[test]
-fn cubes_are_tight() {
-    is_tight("cube", &cube(""));
-    is_tight("turned cube", &cube(TURNED));
+/// Names of bodies and their shapes.
+fn bodies() -> Vec<(&'static str, String)> {
     let far = transform("<translate x=\"5\" y=\"7\" z=\"9\"/>");
-    let around = format!("{}<shape type=\"cube\">{far}</shape>", cube(TURNED));
-    is_tight("turned cube away from the centre", &around);
-}
-
-#[test]
-fn t_junctions_are_tight() {
-    let cube = |turn: &str| {
-        format!("<shape type=\"obj\"><string name=\"filename\" value=\"cube.obj\"/>{}</shape>", transform(turn))
+    let mesh = |file: &str, turn: &str| {
+        format!("<shape type=\"obj\"><string name=\"filename\" value=\"{file}\"/>{}</shape>", transform(turn))
     };
-    is_tight("T-junctions", &cube(""));
-    is_tight("turned T-junctions", &cube(TURNED));
-}
-
-#[test]
-fn open_edges_that_touch_are_tight() {
-    is_tight("rectangles", &rectangles(""));
-    is_tight("turned rectangles", &rectangles(TURNED));
-}
-
-#[test]
-fn round_bodies_are_tight() {
-    is_tight("sphere", &format!("<shape type=\"sphere\">{}</shape>", transform(TURNED)));
-    let cap = |turn: &str| format!("<shape type=\"disk\">{}</shape>", transform(turn));
-    let wall = format!(
-        "<shape type=\"cylinder\">{}</shape>",
-        transform(&format!("<scale z=\"2\"/><translate z=\"-1\"/>{TURNED}"))
-    );
-    let caps = ["-1", "1"].map(|z| cap(&format!("<translate z=\"{z}\"/>{TURNED}")));
-    is_tight("can", &format!("{wall}{}", caps.concat()));
-}
-
-#[test]
-fn instances_are_tight() {
+    let wall = transform(&format!("<scale z=\"2\"/><translate z=\"-1\"/>{TURNED}"));
+    let caps = ["-1", "1"]
+        .map(|z| format!("<shape type=\"disk\">{}</shape>", transform(&format!("<translate z=\"{z}\"/>{TURNED}"))));
     let group = format!("<shape type=\"shapegroup\" id=\"g\">{}</shape>", cube(""));
-    let placed =
-        format!("<shape type=\"instance\"><ref id=\"g\"/>{}</shape>", transform("<scale x=\"0.8\" y=\"1.3\"/>"));
-    is_tight("instance", &format!("{group}{placed}"));
+    let placed = transform("<scale x=\"0.8\" y=\"1.3\"/>");
+    vec![
+        ("cube", cube("")),
+        ("turned cube", cube(TURNED)),
+        ("turned cube away from the centre", format!("{}<shape type=\"cube\">{far}</shape>", cube(TURNED))),
+        ("T-junctions", mesh("cube.obj", "")),
+        ("turned T-junctions", mesh("cube.obj", TURNED)),
+        ("rectangles", rectangles("")),
+        ("turned rectangles", rectangles(TURNED)),
+        ("sphere", format!("<shape type=\"sphere\">{}</shape>", transform(TURNED))),
+        ("ball of triangles", mesh("ball.obj", TURNED)),
+        ("can", format!("<shape type=\"cylinder\">{wall}</shape>{}", caps.concat())),
+        ("instance", format!("{group}<shape type=\"instance\"><ref id=\"g\"/>{placed}</shape>")),
+    ]
+}
+
+fn are_tight(rays: u32) {
+    let bodies = bodies();
+    let backends = [Backend::default_available(), Backend::Obvhs];
+    bodies.par_iter().flat_map(|body| backends.map(|backend| (body, backend))).for_each(|((what, shapes), backend)| {
+        let scene = body(shapes, backend);
+        let found = leaks(&scene, &edges(&scene), rays);
+        assert_eq!(found, (0, 0), "{what}, {backend:?}: rays that miss the edge, rays that leave the point met");
+    });
+}
+
+#[test]
+fn closed_bodies_are_tight() {
+    are_tight(RAYS);
+}
+
+#[test]
+#[ignore = "a long run by hand; the bounded one is closed_bodies_are_tight"]
+fn closed_bodies_are_tight_for_many_rays() {
+    are_tight(50 * RAYS);
 }
