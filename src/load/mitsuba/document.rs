@@ -1,5 +1,6 @@
 //! XML text into a tree: spans, includes, `<default>` and `-D` parameters, aliases, ids, renaming of old spellings.
 
+use super::encoding;
 use super::limits::Usage;
 use super::objects::FORCE;
 use crate::image::{MAX_TEXT_BYTES, read_regular};
@@ -151,14 +152,7 @@ impl Loader<'_> {
             }
         };
         self.report.opened(path);
-        let text = String::from_utf8(text).unwrap_or_else(|e| {
-            let d = Diagnostic::warning(
-                "scene::not-utf8",
-                format!("`{}` is not UTF-8 throughout; unknown characters are replaced", path.display()),
-            );
-            self.report.push(d);
-            String::from_utf8_lossy(e.as_bytes()).into_owned()
-        });
+        let text = self.decoded(text, path, from)?;
         let source = Arc::new(Source { path: path.to_path_buf(), text });
         let identity = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         if self.open.contains(&identity) {
@@ -190,6 +184,29 @@ impl Loader<'_> {
         let root = self.element(root, &File { source: &source, legacy });
         self.open.pop();
         root
+    }
+
+    /// The text of a file; `None` if its encoding is not known.
+    fn decoded(&mut self, bytes: Vec<u8>, path: &Path, from: Option<&Span>) -> Option<String> {
+        match encoding::decode(bytes) {
+            Ok(decoded) => {
+                if decoded.is_damaged {
+                    let message = format!(
+                        "`{}` is not {} throughout; unknown characters are replaced",
+                        path.display(),
+                        decoded.encoding
+                    );
+                    self.report.push(Diagnostic::warning("scene::not-utf8", message));
+                }
+                Some(decoded.text)
+            }
+            Err(label) => {
+                let message = format!("`{}` is in the encoding `{label}`, which is not known", path.display());
+                let d = Diagnostic::error("scene::unknown-encoding", message);
+                self.report.push(d.at(from.cloned()).help("convert the file to UTF-8"));
+                None
+            }
+        }
     }
 
     /// Reports that the scene exceeds a limit, the first time.

@@ -10,6 +10,7 @@ mod color;
 mod conductors;
 mod document;
 mod emitter;
+mod encoding;
 mod indices;
 mod limits;
 mod objects;
