@@ -11,6 +11,8 @@ use std::path::Path;
 pub(super) struct MeshOptions {
     /// Drop vertex normals: the surface is faceted.
     pub face_normals: bool,
+    /// Vertex normals are made anew; edges at which the normals of faces differ by more stay sharp.
+    pub max_smooth_angle: Option<SmoothAngle>,
     /// Texture v becomes 1 − v. Pictures have v = 0 at their *top* row here, as in Mitsuba 3; OBJ files have it at the
     /// bottom.
     pub flip_v: bool,
@@ -19,6 +21,20 @@ pub(super) struct MeshOptions {
     /// The mesh is placed by a transform that mirrors. Vertex normals of the file keep their meaning then (they go with
     /// the inverse transpose), while the winding turns round: it is reversed here so that both stay on one side.
     pub mirrored: bool,
+}
+
+/// An angle in degrees by its bits, so that meshes read with equal options are known as equal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct SmoothAngle(u32);
+
+impl SmoothAngle {
+    pub(super) fn degrees(degrees: f32) -> SmoothAngle {
+        SmoothAngle(degrees.to_bits())
+    }
+
+    fn cosine(self) -> f32 {
+        f32::from_bits(self.0).to_radians().cos()
+    }
 }
 
 /// Colours of a mesh.
@@ -137,6 +153,10 @@ pub(super) fn finish(mesh: &mut MeshDesc, options: MeshOptions) {
         for uv in &mut mesh.uvs {
             uv.y = 1.0 - uv.y;
         }
+    }
+    if let Some(angle) = options.max_smooth_angle {
+        normals::split_at_creases(mesh, angle.cosine());
+        mesh.normals = Vec::new();
     }
     if options.face_normals {
         mesh.normals = Vec::new();

@@ -5,7 +5,7 @@ use super::objects::{Builder, FORCE};
 use super::props::Props;
 use super::spectrum::Purpose::Emission;
 use crate::load::assets::MeshSource;
-use crate::load::mesh::{MeshColors, MeshOptions};
+use crate::load::mesh::{MeshColors, MeshOptions, SmoothAngle};
 use crate::load::primitives::Primitive;
 use crate::math::{Frame, Rgb};
 use crate::scene::diag::Diagnostic;
@@ -162,7 +162,8 @@ impl Builder<'_> {
             "ply" | "obj" | "serialized" => {
                 options.face_normals = p.boolean_or("face_normals", false);
                 options.flip_v = p.boolean_or("flip_tex_coords", p.plugin == "obj");
-                p.ignore(&["max_smooth_angle", "collapse", "srgb"]);
+                options.max_smooth_angle = smooth_angle(p, options.face_normals);
+                p.ignore(&["collapse", "srgb"]);
                 let (path, place) = self.file(p, "filename")?;
                 span = place;
                 Source::Mesh(match p.plugin {
@@ -248,6 +249,21 @@ impl Builder<'_> {
         p.finish();
         Some(AreaEmission { radiance, span: Some(p.span()) })
     }
+}
+
+/// The angle of `max_smooth_angle`, which excludes `face_normals`.
+fn smooth_angle(p: &Props<'_>, face_normals: bool) -> Option<SmoothAngle> {
+    let degrees = p.float("max_smooth_angle")?;
+    if face_normals {
+        p.error("scene::bad-value", "`max_smooth_angle` and `face_normals` exclude each other");
+        return None;
+    }
+    if !(0.0..=180.0).contains(&degrees)
+        && let Some(node) = p.get("max_smooth_angle")
+    {
+        p.bad_value(node, "value", format!("a smooth angle of {degrees} degrees"), "an angle from 0 to 180");
+    }
+    Some(SmoothAngle::degrees(degrees as f32))
 }
 
 /// The unit cylinder (around z from 0 to 1) → `p0` … `p1` with `radius`. The tangents are Mitsuba's: texture

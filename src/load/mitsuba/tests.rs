@@ -494,6 +494,7 @@ fn files_are_found_read_and_mistakes_in_them_placed() {
     assert!(!e.io && e.to_string().contains("line 11: `y` is not a number"), "{e}");
 }
 
+mod creases;
 mod encodings;
 mod hostile;
 mod legacy;
