@@ -91,7 +91,8 @@ impl Builder<'_> {
                 "bsdf" | "texture" | "film" | "sampler" | "rfilter" => {}
                 // Where something refers to a medium, this is reported there.
                 "medium" | "volume" if !self.referenced.contains(&child) => self.ignored_medium(child),
-                "medium" | "volume" | "ref" | "spectrum" => {}
+                "ref" => self.reference(child),
+                "medium" | "volume" | "spectrum" => {}
                 tag => {
                     let d = Diagnostic::error(
                         "scene::misplaced-element",
@@ -114,6 +115,22 @@ impl Builder<'_> {
                 "rfilter" => drop(self.filter(child)),
                 _ => {}
             }
+        }
+    }
+
+    /// A `<ref>` directly in the scene: the object is a part of the scene as if it stood here. One that stands directly
+    /// in the scene is a part of it once, except for emitters, which shine twice then, as in Mitsuba 3.
+    fn reference(&mut self, node: usize) {
+        let Some(object) = self.resolve(node) else { return };
+        let is_part = self.tree.nodes[self.tree.root].children.contains(&object);
+        let element = self.node(object);
+        match element.tag.as_str() {
+            "shape" if !is_part => self.shape(object),
+            "integrator" if !is_part => self.integrator(object),
+            // An area light without a shape shines nowhere.
+            "emitter" if element.attr("type").is_none_or(|a| a.value != "area") => self.emitter(object),
+            // Everything else has an effect only where something refers to it.
+            _ => {}
         }
     }
 

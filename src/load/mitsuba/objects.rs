@@ -27,7 +27,7 @@ pub(super) struct Builder<'t> {
     pub bsdfs: HashMap<usize, Option<BsdfId>>,
     pub textures: HashMap<usize, Option<TextureId>>,
     pub groups: HashMap<usize, Option<GroupId>>,
-    /// Elements that a `<ref>` names.
+    /// Elements that a `<ref>` inside of another object names.
     pub referenced: HashSet<usize>,
     /// Elements under construction, outermost first.
     open: Vec<usize>,
@@ -35,7 +35,9 @@ pub(super) struct Builder<'t> {
 
 impl<'t> Builder<'t> {
     pub(super) fn new(tree: &'t Tree, report: &'t RefCell<Report>, assets: Assets) -> Builder<'t> {
-        let names = tree.nodes.iter().filter(|n| n.tag == "ref").filter_map(|n| n.attr("id"));
+        let in_scene: HashSet<usize> = tree.nodes[tree.root].children.iter().copied().collect();
+        let refs = tree.nodes.iter().enumerate().filter(|(i, n)| n.tag == "ref" && !in_scene.contains(i));
+        let names = refs.filter_map(|(_, n)| n.attr("id"));
         let referenced = names.filter_map(|id| tree.ids.get(&id.value).copied()).collect();
         Builder {
             tree,

@@ -22,6 +22,28 @@ fn area_lights_may_stand_in_the_scene() {
     assert_eq!(messages(load(&scene(LIGHT))), [("scene::misplaced-element", 2, 1)]);
 }
 
+/// As in Mitsuba 3.9.1: what is referred to is a part of the scene; a shape that is one already is so once, a light of its
+/// own shines twice.
+#[test]
+fn references_in_the_scene_place_what_they_name() {
+    let group = "<shape type=\"shapegroup\" id=\"g\"><shape type=\"sphere\" id=\"ball\"/></shape>";
+    assert_eq!(good(group).shapes.len(), 1);
+    assert_eq!(good(&format!("{group}<ref id=\"ball\"/>")).shapes[1].name.as_deref(), Some("ball"));
+    assert_eq!(good(&format!("<ref id=\"ball\"/>{group}")).shapes.len(), 2);
+    for part in
+        ["<shape type=\"disk\" id=\"x\"/>", "<shape type=\"shapegroup\" id=\"x\"><shape type=\"disk\"/></shape>"]
+    {
+        assert_eq!(good(&format!("{part}<ref id=\"x\"/>")).shapes.len(), good(part).shapes.len(), "{part}");
+    }
+    assert_eq!(good("<emitter type=\"point\" id=\"x\"/><ref id=\"x\"/>").emitters.len(), 3);
+    let lamp = format!("<shape type=\"rectangle\">{LIGHT}</shape><ref id=\"glow\"/>");
+    assert_eq!((good(&lamp).emitters.len(), good(&lamp).shapes.len()), (1, 2));
+    assert_eq!(good("<bsdf type=\"diffuse\" id=\"x\"/><ref id=\"x\"/>").bsdfs.len(), 1);
+    assert_eq!(messages(load(&scene("<ref id=\"nobody\"/>"))), [("scene::undefined-reference", 2, 10)]);
+    // A light on no surface is one of no shape that a reference in the scene could help.
+    assert_eq!(messages(load(&scene(&format!("{LIGHT}<ref id=\"glow\"/>")))), [("scene::misplaced-element", 2, 1)]);
+}
+
 #[test]
 fn films_samplers_and_filters_may_stand_in_the_scene() {
     let declared = "<rfilter type=\"tent\" id=\"f\"><float name=\"radius\" value=\"2\"/></rfilter>\
