@@ -29,12 +29,18 @@ impl Report {
         Report { force, ..Report::default() }
     }
 
-    /// Adds a message, once for each place (an object that several others refer to is read for each of them); errors
-    /// beyond the limit are counted only.
-    pub(super) fn push(&mut self, mut d: Diagnostic) {
+    /// The message as this report takes it: what is not supported is a warning if the scene is forced to load.
+    pub(super) fn graded(&self, mut d: Diagnostic) -> Diagnostic {
         if self.force && d.changes_picture {
             d.severity = d.severity.min(Severity::Warning);
         }
+        d
+    }
+
+    /// Adds a message, once for each place (an object that several others refer to is read for each of them); errors
+    /// beyond the limit are counted only.
+    pub(super) fn push(&mut self, d: Diagnostic) {
+        let d = self.graded(d);
         if let Some(span) = &d.span {
             let file = Arc::as_ptr(&span.source) as usize;
             if !self.seen.insert((d.code, d.message.clone(), file, span.range.start)) {

@@ -4,7 +4,7 @@ use super::JobError;
 use crate::integrators::{self, Integrator, IntegratorSpec, Params, Renamed};
 use crate::prepared::PreparedScene;
 use crate::scene::diag::nearest;
-use crate::scene::{Diagnostic, Diagnostics, SceneDesc};
+use crate::scene::{Diagnostic, Diagnostics, SceneDesc, Severity};
 
 /// Parameters that describe the picture, whichever integrator renders it: a scene's block for another integrator
 /// still sets them.
@@ -42,7 +42,7 @@ impl MethodRequest {
     pub fn resolve(&self, desc: &SceneDesc, diagnostics: &mut Diagnostics) -> Result<Method, JobError> {
         let spec = match &self.integrator {
             Some(name) => find_integrator(name)?,
-            None => scene_integrator(desc, diagnostics),
+            None => scene_integrator(desc, diagnostics)?,
         };
         let mut params = Params::defaults(spec);
         set_from_scene(&mut params, spec, desc, diagnostics);
@@ -97,14 +97,24 @@ pub fn find_integrator(name: &str) -> Result<&'static IntegratorSpec, JobError> 
 }
 
 /// The integrator that the scene file names; `path` if it names none that is known here.
-fn scene_integrator(desc: &SceneDesc, diagnostics: &mut Diagnostics) -> &'static IntegratorSpec {
-    let Some(block) = &desc.integrator else { return &integrators::path::SPEC };
-    integrators::find(&block.name).unwrap_or_else(|| {
+///
+/// # Errors
+/// If it makes another kind of picture and the scene was not forced to load.
+fn scene_integrator(desc: &SceneDesc, diagnostics: &mut Diagnostics) -> Result<&'static IntegratorSpec, JobError> {
+    let Some(block) = &desc.integrator else { return Ok(&integrators::path::SPEC) };
+    if let Some(refused) = &block.refused {
+        if refused.severity == Severity::Error {
+            return Err(JobError::Input(format!("{}; name another one with -i", refused.line())));
+        }
+        diagnostics.push(refused.clone());
+        return Ok(&integrators::path::SPEC);
+    }
+    Ok(integrators::find(&block.name).unwrap_or_else(|| {
         let message = format!("integrator \"{}\" is not known here; rendering with \"path\"", block.name);
         let warning = Diagnostic::warning("integrator::unknown", message);
         diagnostics.push(warning.at(block.span.clone()).label(known_integrators(&block.name)));
         &integrators::path::SPEC
-    })
+    }))
 }
 
 /// Sets the parameters of the scene's block that apply to `spec`. Unusable values are reported and left out.

@@ -4,7 +4,7 @@
 //! whose files are read; each field says its unit where it has one.
 
 use super::bsdf::BsdfDesc;
-use super::diag::Span;
+use super::diag::{Diagnostic, Span};
 use crate::image::Image;
 use crate::math::Rgb;
 use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
@@ -152,6 +152,8 @@ pub struct IntegratorDesc {
     pub name: String,
     /// `max_depth` and the like.
     pub params: Vec<(String, String, Option<Span>)>,
+    /// It makes another kind of picture than any integrator here: to be said where it would be used.
+    pub refused: Option<Diagnostic>,
     /// Where it stands.
     pub span: Option<Span>,
 }

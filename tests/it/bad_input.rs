@@ -348,3 +348,13 @@ fn an_instance_scaled_to_nothing_is_refused() {
         refused(&sandbox, &arguments, 2, &["scene::bad-transform", "the transform of this instance"]);
     }
 }
+
+/// An integrator that shows something else than light is refused where it would be used, and only there.
+#[test]
+fn integrators_of_other_pictures_are_refused() {
+    let sandbox = Sandbox::new();
+    sandbox.write_box_with("scene.xml", "<integrator type=\"path\">", "<integrator type=\"depth\">");
+    refused(&sandbox, "scene.xml", 2, &["scene.xml", "`depth` is not supported", "--aov depth"]);
+    sandbox.run("render scene.xml -i path --spp 1 -o a.pfm").expect(0, &[]);
+    sandbox.run("render scene.xml --force --spp 1 -o a.pfm").expect(0, &["`depth` is not supported"]);
+}

@@ -192,7 +192,7 @@ impl BsdfProps<'_, '_, '_, '_> {
 
 impl ParamSource for BsdfProps<'_, '_, '_, '_> {
     fn color(&mut self, name: &'static str, default: f32) -> ColorDesc {
-        self.builder.color(self.props, self.spelling(name), default, Reflectance)
+        self.builder.reflectance(self.props, self.spelling(name), default)
     }
 
     fn scalar(&mut self, name: &'static str, default: f32) -> ScalarDesc {
@@ -209,7 +209,6 @@ impl ParamSource for BsdfProps<'_, '_, '_, '_> {
 
     fn principled_ior(&mut self) -> f32 {
         let p = self.props;
-        p.ignore(&["main_specular_sampling_rate", "clearcoat_sampling_rate", "diffuse_reflectance_sampling_rate"]);
         let eta = match (p.float("eta"), p.float("specular")) {
             (Some(_), Some(_)) => {
                 p.error("scene::duplicate-property", "give either `eta` or `specular`");

@@ -12,6 +12,9 @@ use crate::math::Rgb;
 use crate::scene::diag::Diagnostic;
 use crate::scene::{ColorDesc, ScalarDesc};
 
+/// Largest component of a reflectance that was scaled down, as in Mitsuba 0.6.
+const CONSERVING: f32 = 0.99;
+
 impl Builder<'_> {
     /// A colour or texture.
     pub(super) fn color(&mut self, props: &Props<'_>, name: &'static str, default: f32, purpose: Purpose) -> ColorDesc {
@@ -32,6 +35,32 @@ impl Builder<'_> {
             return self.texture(given, object).map(ColorDesc::Texture);
         }
         self.constant(node, purpose, "a colour or texture").map(ColorDesc::Constant)
+    }
+
+    /// A reflectance or texture. Constants that are not in [0, 1] are treated as Mitsuba does: version 3 refuses colours
+    /// and takes numbers above 1, which is worth a warning; 0.6 scales them down.
+    pub(super) fn reflectance(&mut self, props: &Props<'_>, name: &'static str, default: f32) -> ColorDesc {
+        let color = self.color(props, name, default, Purpose::Reflectance);
+        let ColorDesc::Constant(c) = color else { return color };
+        let (least, largest) = (c.r.min(c.g).min(c.b), c.r.max(c.g).max(c.b));
+        let object = props.get_index(name).and_then(|given| self.resolve(given));
+        let Some(node) = object.filter(|_| least < 0.0 || largest > 1.0).map(|object| self.node(object)) else {
+            return color;
+        };
+        let range = "numbers from 0 to 1";
+        if least < 0.0 || (!node.legacy && matches!(node.tag.as_str(), "rgb" | "srgb")) {
+            let value = if least < 0.0 { least } else { largest };
+            props.bad_value(node, "value", format!("the reflectance `{name}` has the value {value}"), range);
+            return color;
+        }
+        let (color, does) = if node.legacy {
+            (ColorDesc::Constant(c * (CONSERVING / largest)), format!("is scaled to {CONSERVING}, as in Mitsuba 0.6"))
+        } else {
+            (color, "makes light of nothing, as in Mitsuba".to_owned())
+        };
+        let d = Diagnostic::warning("scene::bright-reflectance", format!("a reflectance `{name}` of {largest} {does}"));
+        self.push(d.at(node.span_of("value")).label(format!("expected {range}")));
+        color
     }
 
     /// A colour that cannot vary.

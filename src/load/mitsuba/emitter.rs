@@ -121,7 +121,6 @@ impl Builder<'_> {
             p.bad_value(node, "value", format!("a turbidity of {turbidity}"), "a number from 1 to 10");
         }
         let scale = p.float_or("scale", 1.0);
-        p.ignore(&["resolution", "stretch", "sun_radius_scale", "complex_sun"]);
         EmitterKind::SunSky {
             to_world: if legacy { to_world * sun::y_up() } else { to_world },
             sun_direction,

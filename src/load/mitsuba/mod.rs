@@ -12,6 +12,7 @@ mod document;
 mod emitter;
 mod encoding;
 mod indices;
+mod integrator;
 mod limits;
 mod objects;
 mod plugins;
@@ -27,10 +28,9 @@ mod values;
 use super::LoadOptions;
 use super::assets::Assets;
 use super::report::Report;
+use crate::scene::SceneDesc;
 use crate::scene::diag::Diagnostic;
-use crate::scene::{IntegratorDesc, SceneDesc};
 use objects::Builder;
-use props::Props;
 use std::cell::RefCell;
 use std::path::Path;
 
@@ -132,23 +132,6 @@ impl Builder<'_> {
             // Everything else has an effect only where something refers to it.
             _ => {}
         }
-    }
-
-    fn integrator(&mut self, node: usize) {
-        let tree = self.tree;
-        let element = &tree.nodes[node];
-        let Some(name) = Props::plugin_name(tree, node, self.report) else { return };
-        let params = element
-            .children
-            .iter()
-            .filter_map(|&child| {
-                let child = &tree.nodes[child];
-                let value = child.attr("value")?;
-                Some((child.attr("name")?.value.clone(), value.value.clone(), Some(value.span.clone())))
-            })
-            .collect();
-        self.scene.integrator =
-            Some(IntegratorDesc { name: name.to_owned(), params, span: Some(element.span.clone()) });
     }
 
     fn ignored_medium(&mut self, node: usize) {

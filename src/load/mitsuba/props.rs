@@ -2,6 +2,8 @@
 //! end those nobody asked for can be reported, with the nearest name that would have been known.
 
 use super::document::{Node, OBJECT_TAGS, Tree};
+use super::objects::FORCE;
+use super::plugins;
 use super::transform;
 use super::values::{number, triple};
 use crate::load::report::Report;
@@ -278,12 +280,21 @@ impl<'t> Props<'t> {
         Some(transform::transform(self.tree, index, self.report))
     }
 
-    /// Reports what nobody asked for.
+    /// Reports what nobody asked for: an error if Mitsuba documents the property and it changes the picture, a warning
+    /// if nobody knows it.
     pub(super) fn finish(&self) {
         let asked = self.asked.borrow();
         for item in self.items.iter().filter(|i| !i.used.get()) {
             let node = &self.tree.nodes[item.node];
             let name = item.name.as_deref().unwrap_or("");
+            if let Some(unread) = plugins::unread(&self.element().tag, self.plugin, name) {
+                if let Some(why) = unread.refusal(node.attr("value").map(|a| a.value.as_str())) {
+                    let message = format!("the property `{name}` of `{}` is not supported: {why}", self.plugin);
+                    let d = Diagnostic::unsupported(message).at(node.span_of("name"));
+                    self.report.borrow_mut().push(d.help(FORCE));
+                }
+                continue;
+            }
             let what = if name.is_empty() { format!("<{}>", node.tag) } else { format!("property `{name}`") };
             let mut d = Diagnostic::warning(
                 "scene::unknown-property",

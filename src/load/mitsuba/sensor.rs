@@ -34,7 +34,6 @@ impl Builder<'_> {
         // Mitsuba's thin lens reads the offset and does not use it.
         let principal_point = if thin { [0.0; 2] } else { offset };
         let to_world = p.transform("to_world").unwrap_or(DMat4::IDENTITY);
-        p.ignore(&["shutter_open", "shutter_close", "kc"]);
 
         let (mut film, mut sample_count) = (None, None);
         for object in p.objects() {
@@ -81,7 +80,6 @@ impl Builder<'_> {
     pub(super) fn sampler(&mut self, node: usize) -> Option<u32> {
         let p = self.props(node)?;
         // Every sampler of Mitsuba's is accepted: which numbers are drawn is the integrators' own business.
-        p.ignore(&["seed", "dimension", "scramble", "sample_offset", "jitter"]);
         let count = p.count("sample_count");
         p.finish();
         count
@@ -110,18 +108,6 @@ impl Builder<'_> {
             let [x, y] = offset.map(|v| v.unwrap_or(0));
             [x, y, size[0].unwrap_or(width.saturating_sub(x)), size[1].unwrap_or(height.saturating_sub(y))]
         });
-        p.ignore(&[
-            "pixel_format",
-            "component_format",
-            "file_format",
-            "banner",
-            "gamma",
-            "exposure",
-            "high_quality_edges",
-            "sample_border",
-            "compensate",
-        ]);
-        p.ignore(&["attach_log", "tonemap_method", "key", "burn", "filename", "variable", "digits"]);
         let mut filter = FilterDesc::Gaussian { stddev: 0.5 };
         for object in p.objects() {
             let Some(object) = self.resolve(object) else { continue };
@@ -143,15 +129,9 @@ impl Builder<'_> {
     pub(super) fn filter(&mut self, node: usize) -> Option<FilterDesc> {
         let p = self.props(node)?;
         let filter = match p.plugin {
-            "box" => {
-                p.ignore(&["radius"]);
-                FilterDesc::Box
-            }
+            "box" => FilterDesc::Box,
             "tent" => FilterDesc::Tent { radius: p.positive_or("radius", 1.0) as f32 },
-            "gaussian" => {
-                p.ignore(&["radius"]);
-                FilterDesc::Gaussian { stddev: p.positive_or("stddev", 0.5) as f32 }
-            }
+            "gaussian" => FilterDesc::Gaussian { stddev: p.positive_or("stddev", 0.5) as f32 },
             "mitchell" => {
                 let third = 1.0 / 3.0;
                 FilterDesc::Mitchell {
@@ -161,7 +141,6 @@ impl Builder<'_> {
             }
             "catmullrom" => FilterDesc::Mitchell { b: 0.0, c: 0.5 },
             "lanczos" => {
-                p.ignore(&["lobes"]);
                 let d = Diagnostic::warning(
                     "scene::replaced-plugin",
                     "the filter `lanczos` is not supported: `gaussian` is used instead",

@@ -136,7 +136,6 @@ impl Builder<'_> {
     fn surface(&mut self, p: &Props<'_>) -> Option<ShapeDesc> {
         let mut outline = self.outline(p)?;
         let flip_normals = p.boolean_or("flip_normals", false);
-        p.ignore(&["silhouette_sampling_weight"]);
         let Parts { material, emission } = self.parts(p);
         p.finish();
         let mut bsdf = material.and_then(|m| self.bsdf(m));
@@ -163,7 +162,6 @@ impl Builder<'_> {
                 options.face_normals = p.boolean_or("face_normals", false);
                 options.flip_v = p.boolean_or("flip_tex_coords", p.plugin == "obj");
                 options.max_smooth_angle = smooth_angle(p, options.face_normals);
-                p.ignore(&["collapse", "srgb"]);
                 let (path, place) = self.file(p, "filename")?;
                 span = place;
                 Source::Mesh(match p.plugin {

@@ -47,7 +47,6 @@ impl Builder<'_> {
                 let wrap = p.choice("wrap_mode", &wraps, WrapMode::Repeat);
                 let usage = if p.boolean_or("raw", false) { ImageUse::Data } else { ImageUse::Color };
                 let usage = legacy_gamma(p).unwrap_or(usage);
-                p.ignore(&["accel", "format", "max_anisotropy", "cache"]);
                 let scale = p.float_or("scale", 1.0) as f32;
                 let (path, span) = self.file(p, "filename")?;
                 let image = self.assets.image(path, usage, span);

@@ -33,3 +33,14 @@ fn three_numbers_in_a_spectrum_are_rgb() {
     let two = "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"1 2\"/></bsdf>";
     assert_eq!(messages(load(&old(two)))[0].0, "scene::bad-value");
 }
+
+/// Mitsuba 0.6 scales a reflectance above 1 so that its largest component is 0.99.
+#[test]
+fn bright_reflectances_are_scaled_down() {
+    let inside = "<bsdf type=\"diffuse\" id=\"d\"><rgb name=\"reflectance\" value=\"1.98, 0.99, 0\"/></bsdf>";
+    let (s, found) = load(&old(inside)).unwrap();
+    assert_eq!(found.list[0].code, "scene::bright-reflectance");
+    let BsdfKind::Model(BsdfModel::Diffuse(p)) = bsdf(&s, "d") else { panic!() };
+    let ColorDesc::Constant(c) = p.reflectance else { panic!() };
+    assert!((c.r - 0.99).abs() < 1e-6 && (c.g - 0.495).abs() < 1e-6 && c.b == 0.0, "{c:?}");
+}
