@@ -8,8 +8,9 @@ use std::collections::HashMap;
 
 /// Cosine of the angle between neighbours in one plane at least: a thousandth of a radian.
 const MIN_COSINE: f64 = 1.0 - 5e-7;
-/// Meshes with more triangles have no flat edges: their triangles are small, and the search would take seconds.
-const MAX_TRIANGLES: usize = 1 << 20;
+/// Meshes with more triangles have no flat edges: the search would take longer than a tenth of a second, and a few points
+/// more that are moved by some error bounds change nothing in meshes of small triangles.
+const MAX_TRIANGLES: usize = 1 << 17;
 
 /// Bit `i` of an entry: the edge of the triangle opposite to corner `i` is inside of a flat region.
 pub(super) fn flat_edges(buffers: &MeshBuffers) -> Vec<u8> {

@@ -66,8 +66,15 @@ impl Triangle {
     /// The edges v1 − v0 and v2 − v0.
     #[inline]
     pub fn edges(&self) -> [Vec3; 2] {
-        let [a, b, c] = self.corners.map(Vec3A::from_vec4);
+        let [a, b, c] = self.corners();
         [(b - a).into(), (c - a).into()]
+    }
+
+    /// Corners without what stands beside them. Not by `map`, which is not always inlined.
+    #[inline]
+    fn corners(&self) -> [Vec3A; 3] {
+        let [a, b, c] = self.corners;
+        [Vec3A::from_vec4(a), Vec3A::from_vec4(b), Vec3A::from_vec4(c)]
     }
 
     /// The point with barycentrics `b`, moved off the edges, and its error bound.
@@ -85,16 +92,16 @@ impl Triangle {
         (!self.is_inside(b, margin)).then(|| self.off_edges(b, self.interpolate(b).0, margin).0)
     }
 
-    #[inline]
+    #[inline(always)]
     fn interpolate(&self, b: [f32; 3]) -> (Vec3, f32) {
-        let [p, q, r] = self.corners.map(Vec3A::from_vec4);
+        let [p, q, r] = self.corners();
         let [a, b, c] = [p * b[0], q * b[1], r * b[2]];
         let bound = (a.abs() + b.abs() + c.abs()).max_element();
         ((a + b + c).into(), interpolation_error(bound))
     }
 
     /// No edge is nearer than `margin`.
-    #[inline]
+    #[inline(always)]
     fn is_inside(&self, b: [f32; 3], margin: f32) -> bool {
         let [p, q, r] = &self.corners;
         b[0] >= margin * p.w && b[1] >= margin * q.w && b[2] >= margin * r.w
