@@ -74,8 +74,26 @@ pub enum BsdfKind {
         /// Second material.
         b: BsdfId,
     },
+    /// A smooth coat over another material.
+    Coating(CoatingDesc),
     /// No surface: light passes.
     Null,
+}
+
+/// A smooth coat of a refracting and absorbing medium over another material (the `coating` of Mitsuba 0.6): light that
+/// enters it is scattered below once, and leaves it or is lost.
+#[derive(Clone, Copy, Debug)]
+pub struct CoatingDesc {
+    /// Material below the coat.
+    pub nested: BsdfId,
+    /// Refractive index of the coat over that of the exterior.
+    pub eta: f32,
+    /// Absorption per unit of length.
+    pub sigma_a: ColorDesc,
+    /// Thickness in the unit of length of `sigma_a`.
+    pub thickness: f32,
+    /// Tint of the reflection by the coat.
+    pub specular_reflectance: ColorDesc,
 }
 
 /// Types of the values of parameters at one stage between file and shading.

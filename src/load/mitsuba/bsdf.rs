@@ -7,20 +7,21 @@ use super::spectrum::Purpose::Reflectance;
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, nearest};
 use crate::scene::{
-    BsdfDesc, BsdfId, BsdfKind, ColorDesc, ComplexIor, Distribution, MODELS, ParamSource, Roughness, ScalarDesc,
-    TextureDesc, TextureId, WardVariant,
+    BK7, BsdfDesc, BsdfId, BsdfKind, CoatingDesc, ColorDesc, ComplexIor, Distribution, MODELS, ParamSource, Roughness,
+    ScalarDesc, TextureDesc, TextureId, WardVariant,
 };
 
 /// Reads a plugin that combines or modifies other materials.
 type ReadOperator = fn(&mut Builder<'_>, &Props<'_>) -> Option<BsdfKind>;
 
 /// Plugins that combine or modify other materials.
-const OPERATORS: [(&str, ReadOperator); 6] = [
+const OPERATORS: [(&str, ReadOperator); 7] = [
     ("twosided", two_sided),
     ("mask", mask),
     ("bumpmap", bump_map),
     ("normalmap", normal_map),
     ("blendbsdf", blend),
+    ("coating", coating),
     ("null", |_, _| Some(BsdfKind::Null)),
 ];
 
@@ -173,6 +174,20 @@ fn blend(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
     let weight = builder.scalar(props, "weight", 0.5);
     let nested = builder.nested(props, 2..=2)?;
     Some(BsdfKind::Blend { weight, a: nested[0], b: nested[1] })
+}
+
+fn coating(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
+    let eta = builder.relative_ior(props, BK7);
+    let sigma_a = builder.color(props, "sigma_a", 0.0, Reflectance);
+    let thickness = props.float_or("thickness", 1.0) as f32;
+    if thickness < 0.0
+        && let Some(node) = props.get("thickness")
+    {
+        props.bad_value(node, "value", format!("a thickness of {thickness}"), "a number that is not negative");
+    }
+    let specular_reflectance = builder.reflectance(props, "specular_reflectance", 1.0);
+    let nested = builder.nested(props, 1..=1)?[0];
+    Some(BsdfKind::Coating(CoatingDesc { nested, eta, sigma_a, thickness, specular_reflectance }))
 }
 
 /// The properties of a plugin as parameters of a scattering model.

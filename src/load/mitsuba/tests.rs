@@ -100,7 +100,7 @@ const MISTAKES: &[(&str, &[&str])] = &[
     (r#"<sensor type="perspective"><film type="hdrfilm"><rfilter type="¦lanczos"/></film></sensor>"#, &["scene::replaced-plugin"]),
     (r#"¦<medium type="homogeneous"/>"#, &["scene::medium-ignored"]),
     (r#"<shape type="cube">¦<medium type="homogeneous" name="interior"/></shape>"#, &["scene::unsupported"]),
-    (r#"<shape type="cube"><bsdf type="¦coating"/></shape>"#, &["scene::unsupported"]),
+    (r#"<shape type="cube"><bsdf type="¦roughcoating"/></shape>"#, &["scene::unsupported"]),
     (r#"<shape type="instance">¦<ref id="g"/></shape><shape type="cube" id="g"/>"#, &["scene::wrong-type"]),
     (r#"<shape type="shapegroup"><shape type="cube">¦<emitter type="area"/></shape></shape>"#, &["scene::instanced-emitter"]),
     (r#"<bsdf type="diffuse"><spectrum name="reflectance" value="¦500:1, 400:1"/></bsdf>"#, &["scene::bad-value"]),

@@ -2,10 +2,14 @@
 
 use super::features::Features;
 use super::lobe::{self, TexturedModel};
-use super::model::TextureBinder;
+use super::model::{TextureBinder, Textured};
 use super::node::Node;
 use super::{MAX_FRAMES, MAX_LOBES};
-use crate::scene::{BsdfDesc, BsdfId, BsdfKind, BsdfModel, Convert, ScalarDesc, TextureId};
+use crate::math::Rgb;
+use crate::scene::{
+    BsdfDesc, BsdfId, BsdfKind, BsdfModel, CoatingDesc, ColorDesc, Convert, Described, PlasticParams, ScalarDesc,
+    TextureId,
+};
 use crate::shade::texture::{ScalarTexture, Texture, TextureSet};
 use std::sync::Arc;
 
@@ -77,6 +81,7 @@ impl<'a> Builder<'a> {
                 let (a, b) = (self.subtree(*a, depth)?, self.subtree(*b, depth)?);
                 Ok(self.blend(weight, a, b))
             }
+            BsdfKind::Coating(coating) => self.coating(coating, depth),
             BsdfKind::BumpMap { nested, height, scale } => {
                 let height = self.texture(*height).ok_or("its height map could not be read")?;
                 Ok(tilted(self.subtree(*nested, depth)?, |nested| Node::BumpMap { nested, height, scale: *scale }))
@@ -104,6 +109,31 @@ impl<'a> Builder<'a> {
         let mut binder = TextureBinder { textures: self.textures, textured: false };
         let scalar = binder.scalar(desc);
         (scalar, Features { textured: binder.textured, ..Features::default() })
+    }
+
+    fn coating(&mut self, coating: &CoatingDesc, depth: u32) -> Result<Subtree, String> {
+        let CoatingDesc { nested, eta, sigma_a, thickness, specular_reflectance } = *coating;
+        let nested = self.subtree(nested, depth)?;
+        if !nested.features.opaque() {
+            return Err("a coat over a material that lets light through is not supported".into());
+        }
+        // The discrete reflection of plastic is that of a smooth coat; its base is black here.
+        let black = ColorDesc::Constant(Rgb::BLACK);
+        let surface = PlasticParams { eta, diffuse_reflectance: black, specular_reflectance, nonlinear: false };
+        let surface = self.model(&BsdfModel::Plastic(surface))?;
+        let mut binder = TextureBinder { textures: self.textures, textured: false };
+        let sigma_a = Convert::<Described, Textured>::color(&mut binder, &sigma_a);
+        let features = Features { two_sided: true, textured: binder.textured, ..surface.features };
+        let node =
+            Node::Coating { nested: Box::new(nested.node), surface: Box::new(surface.node), eta, sigma_a, thickness };
+        Ok(Subtree {
+            features: nested.features.union(features),
+            // The coat's surface on both sides; its back and what is below it have frames.
+            lobes: nested.lobes + 2,
+            frames: nested.frames + 2,
+            black: false,
+            node,
+        })
     }
 
     fn mask(&self, nested: Subtree, opacity: &ScalarDesc) -> Subtree {

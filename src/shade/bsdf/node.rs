@@ -3,7 +3,7 @@
 use super::Bsdf;
 use super::diffuse::Diffuse;
 use super::lobe::{Lobe, TexturedModel};
-use super::nested_frame::{NestedFrame, ROOT, Step, tilted_frame};
+use super::nested_frame::{Coat, NestedFrame, ROOT, Step, tilted_frame};
 use super::view::WeightedLobe;
 use crate::math::{Frame, Rgb, Vec3};
 use crate::scene::DiffuseParams;
@@ -37,6 +37,14 @@ pub(super) enum Node {
         weight: ScalarTexture,
         a: Box<Node>,
         b: Box<Node>,
+    },
+    /// `surface` is what the coat itself reflects.
+    Coating {
+        nested: Box<Node>,
+        surface: Box<Node>,
+        eta: f32,
+        sigma_a: ColorTexture,
+        thickness: f32,
     },
     /// No surface.
     Null,
@@ -74,7 +82,8 @@ impl Node {
     pub fn holes(&self, point: &SurfacePoint) -> f32 {
         match self {
             Node::Null => 1.0,
-            Node::Model(_) => 0.0,
+            // A coat covers what has no holes.
+            Node::Model(_) | Node::Coating { .. } => 0.0,
             Node::TwoSided { front, back } => front.holes(point).min(back.holes(point)),
             Node::BumpMap { nested, .. } | Node::NormalMap { nested, .. } => nested.holes(point),
             Node::Mask { nested, opacity } => {
@@ -151,6 +160,13 @@ impl Resolver<'_> {
                 let weight = weight.eval(self.point).clamp(0.0, 1.0);
                 self.visit(a, Context { weight: at.weight * (1.0 - weight), ..at });
                 self.visit(b, Context { weight: at.weight * weight, ..at });
+            }
+            Node::Coating { nested, surface, eta, sigma_a, thickness } => {
+                // Both sides of the coat reflect.
+                self.two_sided(surface, surface, at);
+                let absorption = sigma_a.eval(self.point).map(|c| c.max(0.0) * thickness);
+                let frame_index = self.push_frame(at.frame_index, Step::Coat(Coat { eta: *eta, absorption }));
+                self.visit(nested, Context { frame_index, ..at });
             }
             Node::BumpMap { nested, height, scale } => {
                 let normal = self.bumped_normal(height, *scale, &at.frame);

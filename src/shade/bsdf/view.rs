@@ -76,8 +76,6 @@ struct SelectedLobe<'a> {
 /// A discrete event of a selected lobe.
 struct DeltaEvent<'a> {
     selected: SelectedLobe<'a>,
-    /// The lobe's frame in root coordinates.
-    frame: Frame,
     /// The direction `wo` in the lobe's frame.
     a: Vec3,
     sample: DeltaSample,
@@ -190,10 +188,11 @@ impl BsdfView<'_> {
         let o = sum.frame.to_local(wo);
         let selected = self.select_lobe(sum, side_index(o.z), u[0])?;
         let lobe = &selected.lobe.lobe;
-        let (frame, a) = nested_frame::frame_of(self.frames, selected.lobe.frame, o);
+        let a = nested_frame::eye_in(self.frames, selected.lobe.frame, o)?;
         match lobe.sample(a, [selected.rest, u[1], u[2]])? {
             LobeSample::Smooth(b) => {
-                let wi = sum.frame.to_world(frame.to_world(b)).normalize();
+                let i = nested_frame::leave(self.frames, selected.lobe.frame, o, b)?;
+                let wi = sum.frame.to_world(i).normalize();
                 let crossed = a.z * b.z < 0.0;
                 let eta = match (crossed, a.z > 0.0) {
                     (false, _) => 1.0,
@@ -202,7 +201,7 @@ impl BsdfView<'_> {
                 };
                 self.smooth_sample(wo, wi, eta, mode)
             }
-            LobeSample::Delta(sample) => self.delta_sample(sum, wo, &DeltaEvent { selected, frame, a, sample }, mode),
+            LobeSample::Delta(sample) => self.delta_sample(sum, wo, &DeltaEvent { selected, a, sample }, mode),
         }
     }
 
@@ -225,14 +224,15 @@ impl BsdfView<'_> {
     }
 
     fn delta_sample(&self, sum: &LobeSum, wo: Vec3, event: &DeltaEvent, mode: Transport) -> Option<BsdfSample> {
-        let DeltaEvent { selected: SelectedLobe { lobe, probability, .. }, frame, a, sample } = event;
-        let (o, i) = (sum.frame.to_local(wo), frame.to_world(sample.b));
+        let DeltaEvent { selected: SelectedLobe { lobe, probability, .. }, a, sample } = event;
+        let o = sum.frame.to_local(wo);
+        let i = nested_frame::leave(self.frames, lobe.frame, o, sample.b)?;
         let wi = sum.frame.to_world(i).normalize();
         let local = match mode {
             Transport::Radiance => nested_frame::enter(self.frames, lobe.frame, o, i)?,
             Transport::Importance => nested_frame::enter(self.frames, lobe.frame, i, o)?,
         };
-        let mut value = sample.value * lobe.weight * local.shadowing;
+        let mut value = sample.value * lobe.weight * local.passing;
         // Walked from `wi` to `wo`: no η², and the cosines exchanged.
         let cosines = self.geometric_ratio(wi, wo) * sample.b.z.abs() / a.z.abs();
         let reverse_value = value * (sample.eta * sample.eta * cosines);
@@ -314,13 +314,14 @@ impl WeightedLobe {
         match mode {
             Transport::Radiance => nested_frame::enter(frames, self.frame, o, i).map_or((Rgb::BLACK, 0.0), |local| {
                 let (value, pdf) = self.lobe.eval_pdf(local.eye, local.light);
-                (value * local.shadowing, pdf)
+                (value * (local.passing * local.jacobian), pdf * local.jacobian)
             }),
             Transport::Importance => {
                 // Tilted normals and their shadowing tell eye and light apart: the adjoint is the radiance seen the
                 // other way.
-                let value = nested_frame::enter(frames, self.frame, i, o)
-                    .map_or(Rgb::BLACK, |local| self.lobe.eval_pdf(local.eye, local.light).0 * local.shadowing);
+                let value = nested_frame::enter(frames, self.frame, i, o).map_or(Rgb::BLACK, |local| {
+                    self.lobe.eval_pdf(local.eye, local.light).0 * (local.passing * local.jacobian)
+                });
                 (value, self.pdf(frames, o, i))
             }
         }
@@ -333,7 +334,7 @@ impl WeightedLobe {
             return self.lobe.pdf(o, i);
         }
         let local = nested_frame::enter(frames, self.frame, o, i);
-        local.map_or(0.0, |LocalDirections { eye, light, .. }| self.lobe.pdf(eye, light))
+        local.map_or(0.0, |LocalDirections { eye, light, jacobian, .. }| self.lobe.pdf(eye, light) * jacobian)
     }
 
     /// Factor from the radiance value at (o, i) to that at (i, o): η² and the exchange of the cosine.

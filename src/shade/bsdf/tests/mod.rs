@@ -294,6 +294,18 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
     let bumped = z.name("bump_conductor", bump(brushed));
     let clear = z.add(glass(rough(Ggx, 0.4, 0.2, true), 1.5, (white(), white())));
     z.name("normal_map", BsdfKind::NormalMap { nested: clear, normals: TextureId(1) });
+    let coat = |nested, sigma_a| {
+        let specular_reflectance = rgb(0.9, 0.8, 0.7);
+        BsdfKind::Coating(CoatingDesc { nested, eta: 1.5, sigma_a, thickness: 0.5, specular_reflectance })
+    };
+    let absorbing = rgb(0.1, 0.5, 1.0);
+    z.name("coating_diffuse", coat(diffuse, rgb(0.0, 0.0, 0.0)));
+    let lacquer = z.name("coating_rough_conductor", coat(brushed, absorbing));
+    z.name("coating_conductor", coat(polished, absorbing));
+    z.name("coating_bump", coat(bumped, absorbing));
+    z.name("coating_coating", coat(lacquer, absorbing));
+    z.name("bump_coating", bump(lacquer));
+    z.name("two_sided_coating", BsdfKind::TwoSided { front: lacquer, back: diffuse });
     z.name("two_sided_bump", BsdfKind::TwoSided { front: bumped, back: bumped });
     let brushed_both = z.add(BsdfKind::TwoSided { front: brushed, back: brushed });
     z.name("bump_two_sided", bump(brushed_both));
