@@ -153,10 +153,11 @@ impl AllocationOptimizer {
     pub fn learn(&mut self, probed: &ProbedIteration) {
         self.add_contributions(probed);
         let (state, each, stats) = (&mut self.state, self.ray_costs, probed.stats);
-        state.costs.base += each.eye * stats.rays(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect]);
+        state.costs.base +=
+            each.eye * stats.rays_with_masks(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect]);
         state.costs.light_image +=
-            each.light * stats.rays(&[RayKind::Light, RayKind::LightBounce, RayKind::ShadowLens]);
-        state.costs.connections += each.connection * stats.rays(&[RayKind::ShadowConnection]);
+            each.light * stats.rays_with_masks(&[RayKind::Light, RayKind::LightBounce, RayKind::ShadowLens]);
+        state.costs.connections += each.connection * stats.rays_with_masks(&[RayKind::ShadowConnection]);
         state.probed += 1;
         if state.probed == PROBE_ITERATIONS && probed.iterations == PROBE_ITERATIONS {
             let variances = variances(probed.film, probed.iterations);
@@ -233,7 +234,7 @@ pub struct SavedAllocation(AllocationState);
 /// Cost of an iteration at an allocation, from the rays of a later iteration than the first at full allocation.
 fn iteration_cost(probed: &ProbedIteration, allocation: &SampleAllocation) -> f64 {
     use iteration_costs::{CONNECTION, EYE, LIGHT, PMF, WEIGHT};
-    let rays = |kinds: &[RayKind]| probed.stats.rays(kinds);
+    let rays = |kinds: &[RayKind]| probed.stats.rays_with_masks(kinds);
     let light = f64::from(allocation.light_image.max(probed.stored_fraction.min(1.0)));
     EYE * rays(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect])
         + LIGHT * light * rays(&[RayKind::Light, RayKind::LightBounce, RayKind::ShadowLens])

@@ -238,6 +238,17 @@ impl RayStats {
         kinds.iter().map(|k| self.kinds[*k as usize].rays as f64).sum()
     }
 
+    /// Rays of some kinds, with those that found the masks on their segments: all segments are taken to cross as many.
+    pub fn rays_with_masks(&self, kinds: &[RayKind]) -> f64 {
+        let of = |kind: &RayKind| self.kinds[*kind as usize].rays as f64;
+        let crossings = of(&RayKind::Mask);
+        if crossings == 0.0 {
+            return self.rays(kinds);
+        }
+        let sum = |kinds: &[RayKind]| kinds.iter().filter(|kind| kind.is_shadow()).map(of).sum::<f64>();
+        self.rays(kinds) + crossings * sum(kinds) / sum(&RayKind::ALL)
+    }
+
     /// Estimated seconds inside the backend, summed over threads.
     pub fn seconds(&self) -> f64 {
         self.kinds.iter().map(KindStats::seconds).sum()
@@ -394,5 +405,24 @@ impl<'a> Tracer<'a> {
         (0..packet.len)
             .filter(|i| blocked >> i & 1 == 0 && !self.transmittance(&packet.get(*i)).is_zero())
             .fold(0, |seen, i| seen | 1 << i)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_are_counted_with_the_segments_that_cross_them() {
+        let mut stats = RayStats::default();
+        for (kind, rays) in [(RayKind::Bounce, 50), (RayKind::ShadowLens, 30), (RayKind::ShadowConnection, 10)] {
+            stats.kinds[kind as usize].rays = rays;
+        }
+        let both = [RayKind::Bounce, RayKind::ShadowLens];
+        assert_eq!(stats.rays_with_masks(&both), 80.0);
+        stats.kinds[RayKind::Mask as usize].rays = 20;
+        assert_eq!(stats.rays_with_masks(&both), 80.0 + 15.0);
+        assert_eq!(stats.rays_with_masks(&[RayKind::ShadowConnection]), 10.0 + 5.0);
+        assert_eq!(stats.rays(&both), 80.0);
     }
 }

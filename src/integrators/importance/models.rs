@@ -1,5 +1,8 @@
 //! The knowledge of the weights of importance caching: the connection factors of `mis::factors`, with the look-ups at
 //! records that they need.
+//!
+//! A record sees a vertex if any light passes the masks between. How much passes counts in the pmfs, and not in the
+//! factor, which need not be good for the result to be right.
 
 use super::distributions::UNIFORM;
 use super::strategy::{NearestRecords, RecordStructure};

@@ -115,7 +115,7 @@ impl PathTracer {
         let share = |tile: &FilmTile| f64::from(tile.pixels()) / f64::from(tile.pixels().div_ceil(PROBE_STRIDE));
         PathProbe {
             variances: film.tiles.iter().map(|t| t.sample_variance(PROBE_SAMPLES) * share(t)).collect(),
-            rays: stats.rays(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect]) * f64::from(all)
+            rays: stats.rays_with_masks(&[RayKind::Camera, RayKind::Bounce, RayKind::ShadowDirect]) * f64::from(all)
                 / (f64::from(probed) * PROBE_SAMPLES as f64),
             stats,
         }

@@ -4,6 +4,9 @@
 //! A weight is wanted before its path's own shadow ray is sent, so the rays between cache points and vertices are
 //! traced at once and not queued. Those to a vertex that was drawn are not traced at all: the pmfs at the cache points
 //! know their answers.
+//!
+//! A cache point sees a vertex if any light passes the masks between. How much passes counts in the pmfs, and not in the
+//! factor, which need not be good for the result to be right.
 
 use super::settings::ResamplingSettings;
 use super::strategy::{CacheStructure, NearestCaches};
