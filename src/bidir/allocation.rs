@@ -72,6 +72,13 @@ pub struct ProbedEfficiency {
     pub cost: f64,
 }
 
+impl ProbedEfficiency {
+    /// Relative variance times cost: the less the better.
+    pub fn product(&self) -> f64 {
+        self.errors.variance * self.cost
+    }
+}
+
 /// The samples of the first iterations, and the decision.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct AllocationState {

@@ -2,6 +2,7 @@
 
 use super::allocation::{AllocationOptimizer, ProbedEfficiency, ProbedIteration, SavedAllocation};
 use super::assignment::{BLOCK_SIDE, contains};
+use super::emission_training::TrainingPaths;
 use super::eye_subpath::{EyeHooks, EyeSubpathRules};
 use super::light_pass::{LightPathPurpose, light_sampler};
 use super::light_subpath::{LightSubpath, LightSubpathUse};
@@ -10,6 +11,7 @@ use super::scratch::{ContributionSink, PassOutput, ProbeStride, ThreadScratch, T
 use super::store::VertexStore;
 use super::strategy::{ConnectionStrategy, LightSubpaths};
 use super::warm_up::WarmUp;
+use crate::emit::EmissionDistribution;
 use crate::film::{Film, FilmTile, LightImage, Pyramid, SampleBuffer, tile_count};
 use crate::math::sampler::PathSampler;
 use crate::mis::{Heuristic, MisContext, SampleAllocation, Techniques};
@@ -32,6 +34,8 @@ pub struct BidirSettings {
     pub light_limits: PathLimits,
     /// Emitters that the camera sees directly are black.
     pub hide_emitters: bool,
+    /// The rays of lights at infinity are guided.
+    pub guided_emission: bool,
 }
 
 /// A bidirectional method at work.
@@ -42,6 +46,8 @@ pub struct Bidirectional<S: ConnectionStrategy> {
     max_eye_vertices: usize,
     pub(super) strategy: S,
     store: VertexStore,
+    /// The rays of lights at infinity are to be guided, and the guide has not been trained yet.
+    train_emission: bool,
     /// The strategy has placed its cache points.
     placed: bool,
     /// How many samples of each group of techniques this iteration takes.
@@ -68,7 +74,8 @@ struct SavedState<A> {
 impl<S: ConnectionStrategy> Bidirectional<S> {
     /// A method with the given strategy, at full allocation.
     pub fn new(settings: BidirSettings, strategy: S) -> Bidirectional<S> {
-        let BidirSettings { techniques, heuristic, eye_limits, light_limits, hide_emitters } = settings;
+        let BidirSettings { techniques, heuristic, eye_limits, light_limits, hide_emitters, guided_emission } =
+            settings;
         Bidirectional {
             hide_emitters,
             max_eye_vertices: techniques.most_eye_vertices(),
@@ -77,11 +84,13 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
                 heuristic,
                 eye_limits,
                 light_limits,
+                emission: EmissionDistribution::default(),
                 directions: ScatterSampler,
                 factor: strategy.factor(),
             },
             strategy,
             store: VertexStore::default(),
+            train_emission: guided_emission,
             placed: false,
             allocation: SampleAllocation::FULL,
             fixed_allocation: SampleAllocation::FULL,
@@ -140,14 +149,42 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         self.mis.factor = self.strategy.factor();
     }
 
+    /// What happens before the first iteration knows the scene, the seed and the limits.
+    fn warm_up<'a>(mis: &'a MisContext<S::Factor>, iteration: &Iteration<'a>) -> WarmUp<'a> {
+        let MisContext { eye_limits, light_limits, ref emission, .. } = *mis;
+        WarmUp { iteration: iteration.with_index(0), eye_limits, light_limits, emission }
+    }
+
+    /// Guides the rays of lights, once; the guide is a function of scene, seed and limits alone.
+    fn train_emission(&mut self, iteration: &Iteration) -> RayStats {
+        if !std::mem::take(&mut self.train_emission) || !self.mis.techniques.uses_light_paths() {
+            return RayStats::default();
+        }
+        let paths = match self.mis.techniques.uses_eye_paths() {
+            true => TrainingPaths::Indirect,
+            false => TrainingPaths::Scattered,
+        };
+        let (emission, stats) = Self::warm_up(&self.mis, iteration).train_emission(paths);
+        self.mis.emission = emission;
+        stats
+    }
+
+    /// Takes over the guide of another method for the same scene, seed and longest path, which is what this one would
+    /// train.
+    pub fn share_emission<T: ConnectionStrategy>(&mut self, other: &Bidirectional<T>) {
+        if self.train_emission && !other.train_emission {
+            self.mis.emission = other.mis.emission.clone();
+            self.train_emission = false;
+        }
+    }
+
     /// Lets the strategy place its cache points, once; they are functions of scene and seed alone.
     fn place(&mut self, iteration: &Iteration) -> RayStats {
         if self.placed || !self.draws_stored() {
             return RayStats::default();
         }
         self.placed = true;
-        let (eye_limits, light_limits) = (self.mis.eye_limits, self.mis.light_limits);
-        self.strategy.place(&WarmUp { iteration: iteration.with_index(0), eye_limits, light_limits })
+        self.strategy.place(&Self::warm_up(&self.mis, iteration))
     }
 
     /// Traces the light sub-paths that all eye sub-paths share, connects them to the lens, and finds the pmfs of their
@@ -266,6 +303,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
     /// Renders one iteration into the film.
     pub fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
         let scene = iteration.scene;
+        let training = self.train_emission(iteration);
         self.begin(iteration);
         let mut output = match self.shares_light_paths() {
             true => self.shared_light_pass(iteration),
@@ -298,6 +336,8 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         output.stats.phases.merge(&phases);
         self.samples = samples;
         self.learn(iteration, film, &output);
+        // Later iterations do not train again: their costs are predicted without it.
+        output.stats.merge(&training);
         output.stats
     }
 
@@ -385,6 +425,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
             return true;
         }
         let Ok(saved) = postcard::from_bytes::<SavedState<SavedAllocation>>(state) else { return false };
+        self.train_emission(iteration);
         // Rays that place cache points belong to the first iteration, whose costs are known already.
         self.place(iteration);
         let allocated = match (&mut self.optimizer, saved.allocation) {
@@ -424,6 +465,7 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
                 self.iterate(&iteration.with_index(index), &mut film);
             }
         }
+        self.train_emission(iteration);
         self.begin(iteration);
         self.prepare_replay(iteration);
         let (mut scratch, mut tracer) = (ThreadScratch::new(ProbeStride(None), self.mis.heuristic), iteration.tracer());

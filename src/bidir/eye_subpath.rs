@@ -133,9 +133,9 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         if !mis.techniques.uses(0, t) || (t == 2 && self.rules.hide_emitters) {
             return;
         }
-        let light = scene.lights.get(id);
-        let chosen = scene.lights.pmf_light(id);
-        let (position, emission) = light.pdf_emission(end.normal(), -direction);
+        let (lights, distribution) = (&scene.lights, &mis.emission);
+        let chosen = distribution.pmf_light(lights, id);
+        let (position, emission) = distribution.pdf_ray(lights, id, end.normal(), -direction, edge.from);
         let origin_pdf = end.pdf_vertex(position, emission) * chosen;
         let drawn = position.0 * emission.0 * chosen.0;
         let origin = Origin {
@@ -197,8 +197,9 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
             return;
         }
         let light = scene.lights.get(id);
-        let (position, emission) = light.pdf_emission_at_sample(sample);
-        let origin_pmf = scene.lights.pmf_light(id);
+        let distribution = &self.rules.mis.emission;
+        let (position, emission) = distribution.pdf_ray_at_sample(&scene.lights, id, sample, vertex.position());
+        let origin_pmf = distribution.pmf_light(&scene.lights, id);
         let drawn = position.0 * emission.0 * origin_pmf.0;
         let origin = Origin {
             light: id,

@@ -79,9 +79,10 @@ impl<S: ConnectionStrategy> LightSubpathTracer<'_, S> {
         out.clear();
         let u = sampler.origin();
         let v = sampler.origin_direction();
-        let Some((id, chosen)) = self.scene.lights.sample_light(u[0]) else { return };
-        let light = self.scene.lights.get(id);
-        let Some(emission) = light.sample_emission([u[1], u[2]], [v[0], v[1]]) else { return };
+        let (lights, distribution) = (&self.scene.lights, &self.mis.emission);
+        let Some((id, chosen)) = distribution.sample_light(lights, u[0]) else { return };
+        let light = lights.get(id);
+        let Some(emission) = distribution.sample_ray(lights, id, [u[1], u[2]], [v[0], v[1]]) else { return };
         out.pdfs.begin(emission.pdf_vertex() * chosen);
         out.emitter = EmitterFactors { can_be_hit: !light.is_delta(), next_event: 0.0 };
         self.mis.accumulate_partial_sums(out.pdfs.all_mut(), PathEnd::Light(out.emitter));

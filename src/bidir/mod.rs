@@ -21,6 +21,7 @@ pub mod allocation;
 mod assignment;
 mod connection;
 pub mod contribution;
+mod emission_training;
 pub mod endpoint;
 mod engine;
 mod eye_subpath;

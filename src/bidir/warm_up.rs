@@ -3,6 +3,7 @@
 use super::light_subpath::{LightSubpath, LightSubpathTracer, LightSubpathUse};
 use super::store::{StoreChunk, VertexStore};
 use super::strategy::NoConnections;
+use crate::emit::EmissionDistribution;
 use crate::math::sampler::PathSampler;
 use crate::mis::factors::Balance;
 use crate::mis::{Heuristic, MisContext, Techniques};
@@ -22,6 +23,8 @@ pub struct WarmUp<'a> {
     pub eye_limits: PathLimits,
     /// Limits of light sub-paths.
     pub light_limits: PathLimits,
+    /// How light sub-paths begin.
+    pub emission: &'a EmissionDistribution,
 }
 
 impl WarmUp<'_> {
@@ -38,6 +41,7 @@ impl WarmUp<'_> {
             heuristic: Heuristic::Balance,
             eye_limits: self.eye_limits,
             light_limits: self.light_limits,
+            emission: self.emission.clone(),
             directions: ScatterSampler,
             factor: Balance,
         };

@@ -8,7 +8,7 @@ use glam::{DMat3, Mat3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-use super::environment::disk_before_scene;
+use super::environment::{disk_before_scene, invert_disk};
 
 /// A point that shines equally in all directions.
 #[derive(Clone, Debug)]
@@ -337,5 +337,10 @@ impl DirectionalLight {
     /// Density of emission rays per unit area of the disk.
     pub fn pdf_position(&self) -> AreaPdf {
         AreaPdf(1.0 / (PI * self.radius * self.radius))
+    }
+
+    /// The numbers that [`DirectionalLight::sample_emission`] maps to the ray through `p`.
+    pub(super) fn invert_emission(&self, p: Vec3) -> [f32; 2] {
+        invert_disk(p, self.direction, self.radius)
     }
 }

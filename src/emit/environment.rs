@@ -3,8 +3,8 @@
 use super::envmap::EnvMap;
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::sunsky::SunSky;
-use crate::math::warp::{SPHERE_PDF, square_to_disk, square_to_sphere};
-use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec3};
+use crate::math::warp::{SPHERE_PDF, disk_to_square, sphere_to_square, square_to_disk, square_to_sphere};
+use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// Radiance around the scene. Directions are unit vectors in the world, from the scene outwards.
@@ -55,6 +55,17 @@ impl Environment {
         }
     }
 
+    /// The numbers that [`Environment::sample`] maps to `dir`: up to two pairs, each with its part of the density, which
+    /// sum to [`Environment::pdf`].
+    pub fn invert(&self, dir: Vec3) -> [(f32, [f32; 2]); 2] {
+        let nothing = (0.0, [0.0; 2]);
+        match self {
+            Environment::Constant(_) => [(SPHERE_PDF, sphere_to_square(dir)), nothing],
+            Environment::Map(map) => [map.invert(dir).map_or(nothing, |u| (map.pdf(dir).0, u)), nothing],
+            Environment::SunSky(sky) => sky.invert(dir),
+        }
+    }
+
     /// ∫ radiance over the sphere.
     pub fn integral(&self) -> Rgb {
         match self {
@@ -76,6 +87,12 @@ pub(super) fn disk_before_scene(u: [f32; 2], direction: Vec3, radius: f32) -> Ve
     let d = square_to_disk(u) * radius;
     let frame = Frame::from_normal(direction);
     frame.s * d.x + frame.t * d.y - direction * radius
+}
+
+/// The numbers that [`disk_before_scene`] maps to the line through `p` in the unit direction `direction`.
+pub(super) fn invert_disk(p: Vec3, direction: Vec3, radius: f32) -> [f32; 2] {
+    let frame = Frame::from_normal(direction);
+    disk_to_square(Vec2::new(frame.s.dot(p), frame.t.dot(p)) / radius)
 }
 
 /// An environment as a light of a scene.
@@ -148,5 +165,10 @@ impl EnvironmentLight {
     /// See [`super::Light::pdf_emission`].
     pub fn pdf_emission(&self, wo: Vec3) -> (AreaPdf, SolidAnglePdf) {
         (self.pdf_position(), self.environment.pdf(-wo))
+    }
+    /// The numbers that [`EnvironmentLight::sample_emission`] maps to the ray through `p` in the unit direction `wo`: of
+    /// the position, and the pairs of [`Environment::invert`] for the direction.
+    pub(super) fn invert_emission(&self, p: Vec3, wo: Vec3) -> ([f32; 2], [(f32, [f32; 2]); 2]) {
+        (invert_disk(p, wo, self.radius), self.environment.invert(-wo))
     }
 }

@@ -9,7 +9,7 @@
 use super::EmitError;
 use super::orientation::Orientation;
 use crate::image::Image;
-use crate::math::piecewise::{CellGrid, sample_in_cell};
+use crate::math::piecewise::{CellGrid, invert_in_cell, sample_in_cell};
 use crate::math::trig::atan2;
 use crate::math::{DMat4, Rgb, SolidAnglePdf, Vec3};
 use glam::Vec4;
@@ -123,6 +123,16 @@ impl EnvMap {
     /// Density of [`EnvMap::sample`] per steradian.
     pub fn pdf(&self, dir: Vec3) -> SolidAnglePdf {
         self.look_up(dir).1
+    }
+
+    /// The numbers that [`EnvMap::sample`] maps to the world direction `dir`; `None` if the picture is black.
+    pub fn invert(&self, dir: Vec3) -> Option<[f32; 2]> {
+        let ([u, v], _) = self.direction_to_grid(self.orientation.to_local(dir));
+        let (x, y) = (u * self.width as f32, v * (self.height - 1) as f32);
+        let cell = [(x as usize).min(self.width - 1), (y as usize).min(self.height - 2)];
+        let place = [x - cell[0] as f32, y - cell[1] as f32];
+        let inside = invert_in_cell(self.corners(cell).map(|texel| texel.w), place);
+        Some(self.cells.as_ref()?.invert(cell, inside))
     }
 
     /// ∫ radiance over the sphere, exact for the interpolated picture.

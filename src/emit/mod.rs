@@ -8,6 +8,7 @@
 
 pub mod camera;
 pub mod delta;
+pub mod emission;
 pub mod environment;
 pub mod envmap;
 pub mod filter;
@@ -27,6 +28,7 @@ mod tests;
 
 pub use camera::{Camera, CameraRay, LensSample};
 pub use delta::{DirectionalLight, PointLight, Projection, SpotLight};
+pub use emission::{EmissionDistribution, EmissionRecord};
 pub use environment::{Environment, EnvironmentLight};
 pub use envmap::EnvMap;
 pub use filter::PixelFilter;

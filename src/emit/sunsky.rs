@@ -54,6 +54,14 @@ impl Sun {
         let (sin, cos) = (TAU * u[1]).sin_cos();
         self.frame.to_world(Vec3::new(r * cos, r * sin, 1.0 - h)).normalize()
     }
+
+    /// The numbers that [`Sun::sample`] maps to a direction of the disk.
+    fn invert(&self, dir: Vec3) -> [f32; 2] {
+        let local = self.frame.to_local(dir);
+        let phi = atan2(local.y, local.x) / TAU;
+        let h = 0.5 * (dir - self.frame.n).length_squared();
+        [(h / self.one_minus_cos).min(1.0), phi - phi.floor()]
+    }
 }
 
 /// The sky's dome.
@@ -194,24 +202,51 @@ impl SunSky {
 
     /// Density of [`SunSky::sample`] per steradian.
     pub fn pdf(&self, dir: Vec3) -> SolidAnglePdf {
+        let [sun, sky] = self.pdfs(dir);
+        SolidAnglePdf(sun + sky)
+    }
+
+    /// The parts of [`SunSky::pdf`] by which sun and sky are sampled.
+    fn pdfs(&self, dir: Vec3) -> [f32; 2] {
         let local = self.orientation.to_local(dir);
         if local.z < 0.0 {
-            return SolidAnglePdf(0.0);
+            return [0.0; 2];
         }
         let sun = self.sun.as_ref().filter(|sun| sun.contains(dir)).map_or(0.0, |sun| 1.0 / sun.solid_angle());
         let sky = self.sky.as_ref().map_or(0.0, |sky| {
-            let phi = atan2(local.y, local.x) / TAU;
-            let sin = (local.x * local.x + local.y * local.y).sqrt();
-            let theta = atan2(sin, local.z) / FRAC_PI_2;
-            sky.density.pdf([phi - phi.floor(), theta]) / (PI * PI * sin.max(MIN_SIN))
+            let (grid, sin) = sky_grid(local);
+            sky.density.pdf(grid) / (PI * PI * sin.max(MIN_SIN))
         });
-        SolidAnglePdf(self.sun_share * sun + (1.0 - self.sun_share) * sky)
+        [self.sun_share * sun, (1.0 - self.sun_share) * sky]
+    }
+
+    /// The numbers that [`SunSky::sample`] maps to `dir`, by way of the sun and by way of the sky, each with its part of
+    /// the density.
+    pub fn invert(&self, dir: Vec3) -> [(f32, [f32; 2]); 2] {
+        let [sun_pdf, sky_pdf] = self.pdfs(dir);
+        let by_sun = self.sun.as_ref().map_or([0.0; 2], |sun| {
+            let [u, v] = sun.invert(dir);
+            [u * self.sun_share, v]
+        });
+        let by_sky = self.sky.as_ref().map_or([0.0; 2], |sky| {
+            let [u, v] = sky.density.invert(sky_grid(self.orientation.to_local(dir)).0);
+            [self.sun_share + u * (1.0 - self.sun_share), v]
+        });
+        [(sun_pdf, by_sun), (sky_pdf, by_sky)]
     }
 
     /// ∫ radiance over the sphere.
     pub fn integral(&self) -> Rgb {
         self.integral
     }
+}
+
+/// Place of a direction of light space on the grid of the sky's density, and the sine of its zenith angle.
+fn sky_grid(local: Vec3) -> ([f32; 2], f32) {
+    let phi = atan2(local.y, local.x) / TAU;
+    let sin = (local.x * local.x + local.y * local.y).sqrt();
+    let theta = atan2(sin, local.z) / FRAC_PI_2;
+    ([phi - phi.floor(), theta], sin)
 }
 
 /// The sky with its sampling density, and its integral over the dome; `None` if it is black.

@@ -12,17 +12,20 @@ use crate::ray::RayStats;
 
 /// The settings that all bidirectional methods have parameters for, with the balance heuristic.
 pub fn settings(params: &Params, techniques: Techniques) -> BidirSettings {
-    let limits = PathLimits {
-        max_edges: u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX),
-        rr_depth: params.int("rr_depth") as u32,
-        rr_scale: 1.0,
-    };
+    settings_with(params, techniques, params.int("rr_depth") as u32)
+}
+
+/// [`settings`] with another `rr_depth`.
+pub fn settings_with(params: &Params, techniques: Techniques, rr_depth: u32) -> BidirSettings {
+    let max_edges = u32::try_from(params.int("max_depth")).unwrap_or(u32::MAX);
+    let limits = PathLimits { max_edges, rr_depth, rr_scale: 1.0 };
     BidirSettings {
         techniques,
         heuristic: Heuristic::Balance,
         eye_limits: limits,
         light_limits: limits,
         hide_emitters: params.bool("hide_emitters"),
+        guided_emission: params.bool("guided_emission"),
     }
 }
 

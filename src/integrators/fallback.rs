@@ -1,10 +1,12 @@
-//! A bidirectional method that leaves a render to path tracing where that is the more efficient one.
+//! A bidirectional method that leaves a render to a simpler one where that is more efficient.
 //!
 //! In a well-lit scene next event finds all light, and what a bidirectional method spends on light sub-paths, on pmfs
-//! and on weights that count them is lost. Its first two iterations, which are part of the picture, predict error and
-//! cost of the allocation that it chose (`mis::allocation`). A few samples of the path tracer, which are not part of
-//! the picture, tell its own. The smaller product of relative variance, of pixels and of 16 × 16 blocks alike, and cost
-//! gets all later iterations.
+//! and on weights that count them is lost. Elsewhere connections matter, but light sub-paths that all pixels share
+//! leave more error in regions than choosing among them saves in pixels: then pixels had better have sub-paths of
+//! their own. The first two iterations of the method, which are part of the picture, predict error and cost of the
+//! allocation that it chose (`mis::allocation`). A few samples of the path tracer and two iterations of bidirectional
+//! path tracing, which are not part of the picture, tell theirs. The smallest product of relative variance, of pixels
+//! and of 16 × 16 blocks alike, and cost gets all later iterations.
 //!
 //! Every iteration is unbiased whatever was decided, since the decision depends on the first two alone and on samples
 //! that no picture has. It counts rays instead of times, so that it is the same on any machine.
@@ -12,22 +14,30 @@
 //! A path tracer may miss in its few samples what it finds rarely. The method has found such light: its own samples
 //! predict the variance of hits and next event with a thousandth of the light sub-paths and connections
 //! ([`SampleAllocation::EYE_ONLY`]), and with eye sub-paths that end as soon as its own do, which is too pessimistic by
-//! a factor. Path tracing is trusted with no less than that variance over `PREDICTION_EXCESS`.
+//! a factor. Path tracing is trusted with no less than that variance over `PREDICTION_EXCESS`. Bidirectional path tracing
+//! may miss light, too; it is not trusted if its picture is darker than the method's.
 //!
 //! [`SampleAllocation::EYE_ONLY`]: crate::mis::SampleAllocation::EYE_ONLY
 
+use super::bdpt::{self, OwnSubpath};
 use super::path::{PathProbe, PathTracer};
 use super::{Integrator, Iteration, Params, Replay};
 use crate::bidir::{Bidirectional, ConnectionStrategy, ProbedEfficiency};
 use crate::film::{Film, Pyramid};
 use crate::mis::Techniques;
-use crate::prepared::Features;
 use crate::ray::RayStats;
 use serde::{Deserialize, Serialize};
 
 /// By how much the prediction may exceed the variance of path tracing: it was 4 to 47 times as large in scenes where
 /// path tracing does well. Where it does not, the prediction was 37 to 600 times the variance of `two-stage`.
 const PREDICTION_EXCESS: f64 = 36.0;
+
+/// Bidirectional path tracing is probed where path tracing's product of variance and cost is less than this many times
+/// the method's. Where it is more, next event and short connections find so little that sharing light sub-paths pays.
+const HOPELESS: f64 = 16.0;
+
+/// Bidirectional path tracing is trusted if its picture is no darker than this, relative to the method's.
+const LEAST_BRIGHTNESS: f64 = 0.9;
 
 /// Who renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,13 +46,17 @@ enum Choice {
     Undecided,
     /// The method.
     Method,
+    /// Bidirectional path tracing.
+    Bdpt,
     /// The path tracer.
     Path,
 }
 
-/// A method beside the path tracer.
-pub struct PathFallback<S: ConnectionStrategy> {
+/// A method beside simpler ones.
+pub struct Fallback<S: ConnectionStrategy> {
     method: Bidirectional<S>,
+    /// `None` beside itself.
+    bdpt: Option<Bidirectional<OwnSubpath>>,
     path: PathTracer,
     choice: Choice,
 }
@@ -54,13 +68,26 @@ struct SavedState {
     method: Vec<u8>,
 }
 
-/// `method`, which may leave the render to path tracing if the parameters allow it.
-pub fn with_path_fallback<S: ConnectionStrategy + 'static>(
+/// `method`, which may leave the render to bidirectional path tracing and to path tracing if the parameters allow it.
+pub fn with_fallback<S: ConnectionStrategy + 'static>(
     params: &Params,
     method: Bidirectional<S>,
 ) -> Box<dyn Integrator> {
+    beside(params, method, Some(bdpt::beside(params)))
+}
+
+/// Bidirectional path tracing, which may leave the render to path tracing if the parameters allow it.
+pub fn with_path_tracing(params: &Params, bdpt: Bidirectional<OwnSubpath>) -> Box<dyn Integrator> {
+    beside(params, bdpt, None)
+}
+
+fn beside<S: ConnectionStrategy + 'static>(
+    params: &Params,
+    method: Bidirectional<S>,
+    bdpt: Option<Bidirectional<OwnSubpath>>,
+) -> Box<dyn Integrator> {
     match is_allowed(params) {
-        true => Box::new(PathFallback { method, path: PathTracer::beside(params), choice: Choice::Undecided }),
+        true => Box::new(Fallback { method, bdpt, path: PathTracer::beside(params), choice: Choice::Undecided }),
         false => Box::new(method),
     }
 }
@@ -69,41 +96,72 @@ pub fn with_path_fallback<S: ConnectionStrategy + 'static>(
 pub fn is_allowed(params: &Params) -> bool {
     let mut usual = Techniques::all();
     usual.switch(1..2, 1..2, false);
-    params.bool("path_fallback") && params.is("allocation", "auto") && params.techniques("techniques") == usual
+    params.bool("fallback") && params.is("allocation", "auto") && params.techniques("techniques") == usual
 }
 
-impl<S: ConnectionStrategy> PathFallback<S> {
+impl<S: ConnectionStrategy> Fallback<S> {
     /// Decides as soon as the method has told its efficiency.
     fn decide(&mut self, iteration: &Iteration) -> RayStats {
-        let Some(efficiency) = self.method.take_efficiency() else { return RayStats::default() };
+        let Some(method) = self.method.take_efficiency() else { return RayStats::default() };
         self.choice = Choice::Method;
-        if self.choice_is_open(iteration.scene.features) {
-            let probe = self.path.probe(iteration);
-            if is_better(&probe, &efficiency) {
-                self.choice = Choice::Path;
-            }
-            return probe.stats;
+        if self.method.pyramid().is_some() {
+            return RayStats::default();
         }
-        RayStats::default()
+        let probe = self.path.probe(iteration);
+        let measured = measured_variance(&probe, &method) * probe.rays;
+        let (mut stats, mut least, mut predicted) = (probe.stats, method.product(), method.errors.eye_only);
+        if measured < HOPELESS * least
+            && let Some(bdpt) = self.probe_bdpt(iteration, &mut stats)
+            && finds_as_much(&bdpt, &method)
+        {
+            predicted = predicted.zip(bdpt.errors.eye_only).map(|(a, b)| a.min(b));
+            if bdpt.product() < least {
+                (self.choice, least) = (Choice::Bdpt, bdpt.product());
+            }
+        }
+        let trusted = predicted.map_or(f64::INFINITY, |variance| variance / PREDICTION_EXCESS * probe.rays);
+        if !PathTracer::is_blind(iteration.scene.features) && measured.max(trusted) < least {
+            self.choice = Choice::Path;
+        }
+        stats
     }
 
-    fn choice_is_open(&self, features: Features) -> bool {
-        !PathTracer::is_blind(features) && self.method.pyramid().is_none()
+    /// Error and cost of bidirectional path tracing, from its first two iterations in a film of their own.
+    fn probe_bdpt(&mut self, iteration: &Iteration, stats: &mut RayStats) -> Option<ProbedEfficiency> {
+        let bdpt = self.bdpt.as_mut()?;
+        bdpt.share_emission(&self.method);
+        let mut film = Film::new(iteration.scene.window);
+        loop {
+            let index = film.begin_iteration();
+            stats.merge(&bdpt.iterate(&iteration.with_index(index), &mut film));
+            let efficiency = bdpt.take_efficiency();
+            if efficiency.is_some() || film.iterations() >= 2 {
+                return efficiency;
+            }
+        }
     }
 }
 
-/// Path tracing has the smaller product of variance and cost.
-fn is_better(probe: &PathProbe, method: &ProbedEfficiency) -> bool {
+/// Relative variance of path tracing as measured.
+fn measured_variance(probe: &PathProbe, method: &ProbedEfficiency) -> f64 {
     let relative = |(variance, scale): (&f64, &f64)| if *scale > 0.0 { variance / scale } else { 0.0 };
-    let probed: f64 = probe.variances.iter().zip(&method.errors.scales).map(relative).sum();
-    let predicted = method.errors.eye_only.map_or(f64::INFINITY, |variance| variance / PREDICTION_EXCESS);
-    probed.max(predicted) * probe.rays < method.errors.variance * method.cost
+    probe.variances.iter().zip(&method.errors.scales).map(relative).sum()
 }
 
-impl<S: ConnectionStrategy> Integrator for PathFallback<S> {
+/// Regions are nearly as bright as the method made them: no light was missed by rare chance.
+fn finds_as_much(bdpt: &ProbedEfficiency, method: &ProbedEfficiency) -> bool {
+    let pairs = bdpt.errors.scales.iter().zip(&method.errors.scales).filter(|(_, scale)| **scale > 0.0);
+    // Scales are squares of brightness. One bright sample must not hide that others are missing.
+    let (sum, regions) = pairs.fold((0.0, 0.0), |(sum, n), (a, b)| (sum + (a / b).sqrt().min(2.0), n + 1.0));
+    sum >= LEAST_BRIGHTNESS * regions
+}
+
+impl<S: ConnectionStrategy> Integrator for Fallback<S> {
     fn iterate(&mut self, iteration: &Iteration, film: &mut Film) -> RayStats {
-        if self.choice == Choice::Path {
-            return self.path.iterate(iteration, film);
+        match (self.choice, &mut self.bdpt) {
+            (Choice::Path, _) => return self.path.iterate(iteration, film),
+            (Choice::Bdpt, Some(bdpt)) => return bdpt.iterate(iteration, film),
+            _ => {}
         }
         let mut stats = self.method.iterate(iteration, film);
         if self.choice == Choice::Undecided {
@@ -113,7 +171,11 @@ impl<S: ConnectionStrategy> Integrator for PathFallback<S> {
     }
 
     fn state(&self) -> Vec<u8> {
-        let method = if self.choice == Choice::Path { vec![] } else { self.method.save() };
+        let method = match (self.choice, &self.bdpt) {
+            (Choice::Path, _) => vec![],
+            (Choice::Bdpt, Some(bdpt)) => bdpt.save(),
+            _ => self.method.save(),
+        };
         postcard::to_allocvec(&SavedState { choice: self.choice, method }).unwrap_or_default()
     }
 
@@ -123,13 +185,20 @@ impl<S: ConnectionStrategy> Integrator for PathFallback<S> {
         }
         let Ok(SavedState { choice, method }) = postcard::from_bytes(state) else { return false };
         self.choice = choice;
-        self.method.restore(iteration, &method)
+        match (choice, &mut self.bdpt) {
+            (Choice::Bdpt, Some(bdpt)) => bdpt.restore(iteration, &method),
+            (Choice::Bdpt, None) => false,
+            _ => self.method.restore(iteration, &method),
+        }
     }
 
     fn notes(&self) -> Vec<String> {
-        match self.choice {
-            Choice::Path => {
-                vec!["path tracing is more efficient in this scene: it renders all but two iterations".into()]
+        let takes_over =
+            |name: &str| format!("{name} is more efficient in this scene: it renders all but two iterations");
+        match (self.choice, &self.bdpt) {
+            (Choice::Path, _) => vec![takes_over("path tracing")],
+            (Choice::Bdpt, Some(bdpt)) => {
+                [takes_over("bidirectional path tracing")].into_iter().chain(bdpt.notes()).collect()
             }
             _ => self.method.notes(),
         }
@@ -152,8 +221,9 @@ impl<S: ConnectionStrategy> Integrator for PathFallback<S> {
                 self.iterate(&iteration.with_index(index), &mut film);
             }
         }
-        match self.choice {
-            Choice::Path => self.path.replay(iteration, pixel),
+        match (self.choice, &mut self.bdpt) {
+            (Choice::Path, _) => self.path.replay(iteration, pixel),
+            (Choice::Bdpt, Some(bdpt)) => bdpt.replay(iteration, pixel),
             _ => self.method.replay(iteration, pixel),
         }
     }

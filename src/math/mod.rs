@@ -1,6 +1,7 @@
 //! Mathematics without any project types: colours, frames, warps with densities and inverses, hashed random streams,
 //! discrete and piecewise distributions, error-bounded floats, statistics.
 
+pub mod box_tree;
 pub mod cdf;
 pub mod discrete;
 pub mod erf;

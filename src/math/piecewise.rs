@@ -181,6 +181,12 @@ pub fn sample_in_cell([a, b, c, d]: [f32; 4], xi: [f32; 2]) -> [f32; 2] {
     [invert_linear_f32(a + (c - a) * t, b + (d - b) * t, xi[0]), t]
 }
 
+/// The numbers that [`sample_in_cell`] maps to the place (s, t).
+pub fn invert_in_cell(corners: [f32; 4], [s, t]: [f32; 2]) -> [f32; 2] {
+    let ([a, b, c, d], [s, t]) = (corners.map(f64::from), [f64::from(s), f64::from(t)]);
+    [linear_cdf(lerp(a, c, t), lerp(b, d, t), s) as f32, linear_cdf(a + b, c + d, t) as f32]
+}
+
 /// [`invert_linear`] in single precision, for places inside of one cell.
 #[inline]
 fn invert_linear_f32(a: f32, b: f32, r: f32) -> f32 {
@@ -259,10 +265,8 @@ impl PiecewiseBilinear {
 
     /// The numbers that [`PiecewiseBilinear::sample`] maps to `p`.
     pub fn invert(&self, p: [f32; 2]) -> [f32; 2] {
-        let (cell, [s, t]) = self.place(p);
-        let ([a, b, c, d], [s, t]) = (self.corners(cell).map(f64::from), [f64::from(s), f64::from(t)]);
-        let inside = [linear_cdf(lerp(a, c, t), lerp(b, d, t), s), linear_cdf(a + b, c + d, t)];
-        self.grid.invert(cell, inside.map(|x| x as f32))
+        let (cell, place) = self.place(p);
+        self.grid.invert(cell, invert_in_cell(self.corners(cell), place))
     }
 }
 

@@ -89,9 +89,16 @@ impl<F: ConnectionFactor> PathView<'_, F> {
     /// p_L(v_i), i = 0 … k − 1.
     fn light_pdfs(&self) -> Vec<f64> {
         let path = self.path;
-        let light = self.scene.lights.get(path.origin.light);
-        let chosen = f64::from(self.scene.lights.pmf_light(path.origin.light).0);
-        let (position, direction) = light.pdf_emission_at_vertex(path.origin.end.normal(), path.origin.direction);
+        let (lights, emission, origin) = (&self.scene.lights, &self.mis.emission, &path.origin);
+        let light = lights.get(origin.light);
+        let chosen = f64::from(emission.pmf_light(lights, origin.light).0);
+        let (position, direction) = emission.pdf_ray_at_vertex(
+            lights,
+            origin.light,
+            origin.end.normal(),
+            origin.direction,
+            path.interior.first().map_or(Vec3::ZERO, |v| v.point.p),
+        );
         let (position, direction) = (f64::from(position.0), f64::from(direction.0));
         let infinite = light.is_infinite();
         let mut pdfs = vec![chosen * if infinite { direction } else { position }];
@@ -129,7 +136,8 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         path.interior.first().map_or(1.0, |v| {
             let chosen = self.scene.lights.pmf_light_from(v.point.p, v.light_choice_normal, path.origin.light);
             if light.is_delta() {
-                return f64::from(chosen.0) / f64::from(self.scene.lights.pmf_light(path.origin.light).0);
+                let emitted = self.mis.emission.pmf_light(&self.scene.lights, path.origin.light);
+                return f64::from(chosen.0) / f64::from(emitted.0);
             }
             let (d, distance) = path.edge(0);
             let direct = f64::from(light.pdf_direct(v.point.p, path.origin.end.normal(), -d, distance).0);

@@ -24,6 +24,7 @@
 use super::factor::{ConnectionFactor, IncidentSubpath, ResamplingTarget};
 use super::pdfs::{ReverseTransport, VertexPdfs};
 use super::{Heuristic, Techniques};
+use crate::emit::EmissionDistribution;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
 use crate::path::{PathLimits, ScatterSampler};
 use crate::ray::Transmittance;
@@ -103,6 +104,8 @@ pub struct MisContext<F> {
     pub eye_limits: PathLimits,
     /// Limits of light sub-paths.
     pub light_limits: PathLimits,
+    /// How light sub-paths begin.
+    pub emission: EmissionDistribution,
     /// How walks draw directions.
     pub directions: ScatterSampler,
     /// c of connections.

@@ -25,8 +25,11 @@ pub const PATH: u64 = 8;
 /// Paths of the path tracer that only tell how well it does, and are not part of a picture.
 pub const PATH_PROBE: u64 = 9;
 
+/// Eye sub-paths that find the rays of lights which matter.
+pub const EMISSION_TRAINING: u64 = 10;
+
 /// Every stream with its name.
-pub const ALL: [(&str, u64); 9] = [
+pub const ALL: [(&str, u64); 10] = [
     ("eye", EYE),
     ("auxiliary", AUXILIARY),
     ("light", LIGHT),
@@ -36,6 +39,7 @@ pub const ALL: [(&str, u64); 9] = [
     ("assignment", ASSIGNMENT),
     ("path", PATH),
     ("path probe", PATH_PROBE),
+    ("emission training", EMISSION_TRAINING),
 ];
 
 #[cfg(test)]

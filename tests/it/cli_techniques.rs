@@ -83,7 +83,7 @@ fn who_has_no_techniques_has_no_pyramid() {
 fn a_sample_is_replayed() {
     let sandbox = Sandbox::new();
     // The scene is one that `bdpt` would leave to path tracing.
-    for (integrator, params) in [("path", ""), ("light", ""), ("bdpt", "-p path_fallback=false")] {
+    for (integrator, params) in [("path", ""), ("light", ""), ("bdpt", "-p fallback=false")] {
         let run =
             sandbox.run(&format!("replay scene.xml -i {integrator} {params} --pixel 5,11 --iteration 2 --seed 7"));
         let text = run.expect(0, &[]).stdout;

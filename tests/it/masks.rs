@@ -57,7 +57,7 @@ fn methods(scene: &PreparedScene) -> impl Iterator<Item = &'static IntegratorSpe
 }
 
 fn render(spec: &'static IntegratorSpec, scene: &PreparedScene, seed: u64) -> Picture {
-    Picture::render(spec, scene, &[("path_fallback", "false")], SPP, seed)
+    Picture::render(spec, scene, &[("fallback", "false")], SPP, seed)
 }
 
 /// Every method renders the picture `expected` of the scene.
@@ -83,7 +83,7 @@ fn a_null_shell_around_a_light_is_nothing() {
     all_agree(&with, &expected, "null shell");
     // The depth of a path does not count them either.
     for spec in methods(&with) {
-        let shallow = Picture::render(spec, &with, &[("max_depth", "2"), ("path_fallback", "false")], SPP, 1);
+        let shallow = Picture::render(spec, &with, &[("max_depth", "2"), ("fallback", "false")], SPP, 1);
         shallow.assert_agrees(&expected, 0.002, spec.name);
     }
 }
@@ -198,7 +198,7 @@ fn weights_count_the_masks_on_every_edge() {
         let (mut checked, mut connections) = (0, 0);
         for variant in 0..6 {
             let mut params = Params::defaults(spec);
-            let common = [("path_fallback", "false"), ("rr_depth", ["5", "1", "2"][variant % 3])];
+            let common = [("fallback", "false"), ("rr_depth", ["5", "1", "2"][variant % 3])];
             let heuristic = [("heuristic", ["balance", "power"][variant % 2])];
             for (name, value) in for_small_scenes(spec, variant)
                 .into_iter()
@@ -209,7 +209,7 @@ fn weights_count_the_masks_on_every_edge() {
             }
             let mut integrator = (spec.build)(&params);
             // Few light sub-paths meet what the camera sees, and other methods find more paths from each pixel.
-            let iterations = if spec.name == "light" { 100 } else { 4 };
+            let iterations = if spec.name == "light" { 100 } else { 8 };
             for c in (0..16 * iterations).flat_map(|i| {
                 let pixel = (i % 4, i / 4 % 4);
                 integrator.replay(&Iteration::new(&scene, 7, u64::from(i / 16)), pixel).contributions

@@ -110,7 +110,7 @@ fn parameters_do_not_change_the_expectation() {
                 "ic-bdpt" => Some(("record_density", "0.2")),
                 _ => Some(("cache_density", "0.2")),
             };
-            let params: Vec<(&str, &str)> = [("allocation", "auto"), ("path_fallback", "false"), ("rr_scale", "0.3")]
+            let params: Vec<(&str, &str)> = [("allocation", "auto"), ("fallback", "false"), ("rr_scale", "0.3")]
                 .into_iter()
                 .chain(places)
                 .chain(params.iter().copied())
@@ -129,7 +129,7 @@ fn rare_connections_agree_with_many_samples() {
     let reference = Picture::render(&path::SPEC, &scene, &[], 2048, 900);
     let params = [
         ("allocation", "auto"),
-        ("path_fallback", "false"),
+        ("fallback", "false"),
         ("rr_scale", "0.3"),
         ("record_density", "0.2"),
         ("distributions", "unoccluded"),

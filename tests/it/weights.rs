@@ -5,6 +5,7 @@ use crate::support::gallery::{GALLERY, exhibit};
 use crate::support::methods::{bidirectional_methods, for_small_scenes};
 use crate::support::pictures::{parse, prepare};
 use lightsieve::bidir::ContributionRecord;
+use lightsieve::emit::EmissionDistribution;
 use lightsieve::integrators::{IntegratorSpec, Iteration, Params, bdpt};
 use lightsieve::math::{AreaPdf, Rgb, SolidAnglePdf};
 use lightsieve::mis::factors::Balance;
@@ -48,6 +49,7 @@ fn context(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, rr_dep
         heuristic,
         eye_limits: limits,
         light_limits: limits,
+        emission: EmissionDistribution::default(),
         directions: ScatterSampler,
         factor: Balance,
     }
@@ -208,7 +210,7 @@ fn weights_of_all_techniques_sum_to_one() {
     for name in GALLERY {
         let scene = prepare(exhibit(name), Backend::default_available(), None);
         let paths: Vec<FullPath> =
-            found(&bdpt::SPEC, &scene, &[("path_fallback", "false")], 8).into_iter().filter_map(|c| c.path).collect();
+            found(&bdpt::SPEC, &scene, &[("fallback", "false")], 8).into_iter().filter_map(|c| c.path).collect();
         for path in &paths {
             for (i, techniques) in SUBSETS.into_iter().enumerate() {
                 let mis = context(&scene, techniques, [Heuristic::Balance, Heuristic::Power][i % 2], [5, 2][i / 2 % 2]);
@@ -256,12 +258,7 @@ fn weights_do_not_depend_on_the_unit_of_length() {
             + &wall(gloss, "", r#"<rotate x="1" angle="-90"/><translate y="-1"/>"#.into())
             + &wall(grey, lamp, r#"<rotate x="1" angle="90"/><scale value="0.4"/><translate y="1"/>"#.into())
             + &wall(grey, "", r#"<rotate y="1" angle="90"/><translate x="-1"/>"#.into());
-        found(
-            &bdpt::SPEC,
-            &prepare(parse(&xml, &[]), Backend::default_available(), None),
-            &[("path_fallback", "false")],
-            16,
-        )
+        found(&bdpt::SPEC, &prepare(parse(&xml, &[]), Backend::default_available(), None), &[("fallback", "false")], 16)
     };
     let unit = room(1.0);
     assert!(unit.len() > 500, "{}", unit.len());

@@ -2,6 +2,7 @@
 
 mod camera;
 mod choice;
+mod emission;
 mod lights;
 mod mitsuba;
 mod round;

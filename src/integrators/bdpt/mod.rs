@@ -8,13 +8,13 @@ mod own_subpath;
 mod params;
 
 use super::params::shared::{
-    ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, PATH_FALLBACK, RR_DEPTH_BIDIRECTIONAL, TECHNIQUES, heuristic,
+    ALLOCATION, FALLBACK, GUIDED_EMISSION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, TECHNIQUES, heuristic,
 };
-use super::{Integrator, IntegratorSpec, Params, bidirectional, fallback};
+use super::{Integrator, IntegratorSpec, ParamDefault, Params, bidirectional, fallback};
 use crate::bidir::allocation::combinations;
 use crate::bidir::{AllocationOptimizer, BidirSettings, Bidirectional, RayCosts};
 use crate::mis::{Heuristic, LightSharing, SampleAllocation};
-use own_subpath::OwnSubpath;
+pub use own_subpath::OwnSubpath;
 
 /// The registry's line.
 pub static SPEC: IntegratorSpec = IntegratorSpec {
@@ -28,8 +28,8 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
         Lafortune and Willems 1993, \"Bi-directional path tracing\"; Veach and Guibas 1994, \"Bidirectional estimators for \
         light transport\"; Veach 1997, chapter 10.",
     params: &[
-        &[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS, heuristic("balance"), TECHNIQUES],
-        &[ALLOCATION, params::LIGHT_PATHS, params::CONNECTIONS, PATH_FALLBACK],
+        &[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS, heuristic("balance"), TECHNIQUES, GUIDED_EMISSION],
+        &[ALLOCATION, params::LIGHT_PATHS, params::CONNECTIONS, FALLBACK],
     ],
     unbiased: true,
     limitations: |_| None,
@@ -40,6 +40,15 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
 const LIGHT_PATHS: [f32; 3] = [1.0, 0.25, 0.0625];
 /// Numbers of connections that may be decided, as fractions of the full number.
 const CONNECTIONS: [f32; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
+
+/// Bidirectional path tracing with its defaults, as far as the parameters of another method do not say otherwise.
+pub fn beside(params: &Params) -> Bidirectional<OwnSubpath> {
+    let ParamDefault::Int { default: rr_depth, .. } = RR_DEPTH_BIDIRECTIONAL.default else { unreachable!() };
+    let settings = bidirectional::settings_with(params, params.techniques("techniques"), rr_depth as u32);
+    let candidates = combinations(&LIGHT_PATHS, &CONNECTIONS);
+    let optimizer = AllocationOptimizer::new(candidates, RayCosts::OWN_SUBPATH, LightSharing::OfPixels);
+    Bidirectional::new(settings, OwnSubpath).with_optimizer(Some(optimizer.predicting_eye_only()))
+}
 
 fn build(params: &Params) -> Box<dyn Integrator> {
     let heuristic = if params.is("heuristic", "balance") { Heuristic::Balance } else { Heuristic::Power };
@@ -52,7 +61,7 @@ fn build(params: &Params) -> Box<dyn Integrator> {
         _ => {
             let optimizer = AllocationOptimizer::new(candidates, RayCosts::OWN_SUBPATH, LightSharing::OfPixels);
             let optimizer = if fallback::is_allowed(params) { optimizer.predicting_eye_only() } else { optimizer };
-            fallback::with_path_fallback(params, this.with_optimizer(Some(optimizer)))
+            fallback::with_path_tracing(params, this.with_optimizer(Some(optimizer)))
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::path::StoredPlace;
 
 /// The strategy of bidirectional path tracing.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct OwnSubpath;
+pub struct OwnSubpath;
 
 /// Light vertices whose connections are left out or made independently of each other; a vertex beyond has the choice of
 /// an earlier one.

@@ -4,7 +4,7 @@ use super::record_pmfs::{Selection, SelectionScheme};
 use super::strategy::{RecordSettings, RecordStrategy};
 use super::{params, surfaces};
 use crate::bidir::Bidirectional;
-use crate::integrators::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL};
+use crate::integrators::params::shared::{GUIDED_EMISSION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL};
 use crate::integrators::{IntegratorSpec, bidirectional};
 use crate::mis::Techniques;
 use crate::mis::factors::Balance;
@@ -20,7 +20,7 @@ pub static IMPORTANCE_CACHING: IntegratorSpec = IntegratorSpec {
         shows as noise.\n\n\
         Georgiev, Křivánek, Popov and Slusallek 2012, \"Importance caching for complex illumination\".",
     params: &[
-        &[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS],
+        &[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS, GUIDED_EMISSION],
         &[params::VIRTUAL_LIGHT_PATHS, params::LIGHTS_PER_VERTEX],
         &[params::RECORD_DENSITY, params::NEAREST_RECORDS],
     ],

@@ -30,9 +30,11 @@ pub use ic_bdpt::IC_BDPT;
 pub use importance_caching::IMPORTANCE_CACHING;
 pub use skeleton::SKELETON;
 
-use super::fallback::with_path_fallback;
+use super::fallback::with_fallback;
 use super::params::presampled::RR_SCALE;
-use super::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, PATH_FALLBACK, RR_DEPTH_RESAMPLED, TECHNIQUES};
+use super::params::shared::{
+    ALLOCATION, FALLBACK, GUIDED_EMISSION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES,
+};
 use super::{Integrator, ParamSpec, Params, bidirectional};
 use crate::bidir::Bidirectional;
 use crate::mis::factors::{Balance, PerLengthFactor, RecordMixtureFactor};
@@ -47,11 +49,12 @@ const CANDIDATES: &[ParamSpec] = &[
     RR_SCALE,
     HIDE_EMITTERS,
     TECHNIQUES,
+    GUIDED_EMISSION,
     params::PRESAMPLED_PATHS,
     params::CONNECTIONS_PER_VERTEX,
 ];
 /// Parameters of methods with several techniques, after those of their records.
-const SELECTION: &[ParamSpec] = &[params::SELECTION, params::DISTRIBUTIONS, params::WEIGHTS, ALLOCATION, PATH_FALLBACK];
+const SELECTION: &[ParamSpec] = &[params::SELECTION, params::DISTRIBUTIONS, params::WEIGHTS, ALLOCATION, FALLBACK];
 
 fn scheme(params: &Params) -> SelectionScheme {
     SelectionScheme {
@@ -86,7 +89,7 @@ fn build(params: &Params, places: RecordPlaces) -> Box<dyn Integrator> {
     let optimizer = bidirectional::optimizer(params);
     macro_rules! with_factor {
         ($factor:ty) => {
-            with_path_fallback(
+            with_fallback(
                 params,
                 Bidirectional::new(common, RecordStrategy::<$factor>::new(settings)).with_optimizer(optimizer),
             )

@@ -3,7 +3,7 @@
 //!
 //! A pinhole or lens that looks at the world through a mirror or a pane is never reached: such paths are missing.
 
-use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL};
+use super::params::shared::{GUIDED_EMISSION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL};
 use super::{IntegratorSpec, bidirectional};
 use crate::bidir::{Bidirectional, NoConnections};
 use crate::mis::Techniques;
@@ -18,7 +18,7 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
         tracing with the techniques t = 1 alone.\n\n\
         Dutré, Lafortune and Willems 1993, \"Monte Carlo light tracing with direct computation of pixel intensities\"; Veach \
         1997, section 8.3.4.",
-    params: &[&[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS]],
+    params: &[&[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, HIDE_EMITTERS, GUIDED_EMISSION]],
     unbiased: true,
     limitations: |features| {
         let specular = features.contains(Features::SPECULAR).then(|| {

@@ -8,9 +8,11 @@
 mod params;
 mod strategy;
 
-use super::fallback::with_path_fallback;
+use super::fallback::with_fallback;
 use super::params::presampled::RR_SCALE;
-use super::params::shared::{ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, PATH_FALLBACK, RR_DEPTH_BIDIRECTIONAL, TECHNIQUES};
+use super::params::shared::{
+    ALLOCATION, FALLBACK, GUIDED_EMISSION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, TECHNIQUES,
+};
 use super::{IntegratorSpec, ParamDefault, ParamSpec, bidirectional};
 use crate::bidir::Bidirectional;
 use strategy::VertexCache;
@@ -25,8 +27,8 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
         Davidovič, Křivánek, Hašan and Slusallek 2014, \"Progressive light transport simulation on the GPU: survey and \
         improvements\", section 5.2. As published: allocation=full.",
     params: &[
-        &[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, NO_RR_SCALE, HIDE_EMITTERS, TECHNIQUES],
-        &[params::PRESAMPLED_PATHS, params::CONNECTIONS_PER_VERTEX, ALLOCATION, PATH_FALLBACK],
+        &[MAX_DEPTH, RR_DEPTH_BIDIRECTIONAL, NO_RR_SCALE, HIDE_EMITTERS, TECHNIQUES, GUIDED_EMISSION],
+        &[params::PRESAMPLED_PATHS, params::CONNECTIONS_PER_VERTEX, ALLOCATION, FALLBACK],
     ],
     unbiased: true,
     limitations: |_| None,
@@ -35,7 +37,7 @@ pub static SPEC: IntegratorSpec = IntegratorSpec {
         let connections = params.auto_int("connections_per_vertex").map(|n| n as u32);
         let settings = bidirectional::resampled_settings(params, params.techniques("techniques"));
         let this = Bidirectional::new(settings, VertexCache::new(paths, connections));
-        with_path_fallback(params, this.with_optimizer(bidirectional::optimizer(params)))
+        with_fallback(params, this.with_optimizer(bidirectional::optimizer(params)))
     },
 };
 

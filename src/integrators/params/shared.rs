@@ -110,21 +110,35 @@ pub const ALLOCATION: ParamSpec = ParamSpec {
     unit: "",
     short: "How many light sub-paths and connections an iteration takes",
     long: "A scene in which connections or the light image contribute little is rendered sooner with fewer of them. \
-        At least 1/16 of the connections and 1/64 of the light sub-paths remain, unless path tracing takes over (path_fallback). The \
+        At least 1/16 of the connections and 1/64 of the light sub-paths remain, unless path tracing takes over (fallback). The \
         decision depends on earlier iterations only, so that every iteration is unbiased, and on counts of rays \
         rather than on times, so that it is the same on any machine. Choose `full` to repeat published methods.",
 };
 
-/// Path tracing may render the scene.
-pub const PATH_FALLBACK: ParamSpec = ParamSpec {
-    name: "path_fallback",
+/// Whether light sub-paths begin where they matter.
+pub const GUIDED_EMISSION: ParamSpec = ParamSpec {
+    name: "guided_emission",
     aliases: &[],
     default: ParamDefault::Bool(true),
     unit: "",
-    short: "Leaves the render to path tracing where that is more efficient",
-    long: "With allocation=auto and all techniques, the first two iterations and a few samples of the path tracer tell \
-        which of them has the smaller product of cost and error, of pixels and of 16x16 blocks alike. Scenes in which \
-        next event finds all light are then rendered as `path` renders them. Scenes with light that path tracing \
-        cannot find are never left to it. The choice is written into the statistics. The expected picture is the \
-        same.",
+    short: "Light sub-paths of sun and sky begin where they matter",
+    long: "In a scene with lights at infinity (sun, sky, environment maps, directional lights), eye sub-paths before the \
+        first iteration find rays of light that bring light to the picture, through the windows of a room for example. \
+        Light sub-paths then begin with such rays more often, and the weights count that. The expected picture is the \
+        same. Choose `false` to repeat published methods.",
+};
+
+/// Simpler methods may render the scene.
+pub const FALLBACK: ParamSpec = ParamSpec {
+    name: "fallback",
+    aliases: &[ParamAlias { name: "path_fallback", values: AliasValues::Same }],
+    default: ParamDefault::Bool(true),
+    unit: "",
+    short: "Leaves the render to a simpler method where that is more efficient",
+    long: "With allocation=auto and all techniques, the first two iterations and a few samples of path tracing and, beside \
+        other methods, of bidirectional path tracing tell which of them has the smallest product of cost and error, of \
+        pixels and of 16x16 blocks alike. Scenes in which next event finds all light are then rendered as `path` \
+        renders them, scenes in which shared light sub-paths leave more error in regions than they save in pixels as \
+        `bdpt` does. Scenes with light that path tracing cannot find are never left to it. The choice is written into \
+        the statistics. The expected picture is the same.",
 };

@@ -20,9 +20,9 @@ pub use pcbpt::PCBPT;
 pub use ris::RIS;
 pub use two_stage::TWO_STAGE;
 
-use super::fallback::with_path_fallback;
+use super::fallback::with_fallback;
 use super::params::presampled::{CONNECTIONS_PER_VERTEX, RR_SCALE};
-use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES};
+use super::params::shared::{GUIDED_EMISSION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES};
 use super::{Integrator, ParamSpec, Params, bidirectional};
 use crate::bidir::Bidirectional;
 use crate::mis::factors::{Balance, PerCacheFactor, RisFactor};
@@ -38,6 +38,7 @@ const ONE_STAGE: &[ParamSpec] = &[
     RR_SCALE,
     HIDE_EMITTERS,
     TECHNIQUES,
+    GUIDED_EMISSION,
     CONNECTIONS_PER_VERTEX,
     params::NEAREST_CACHES,
     params::CACHE_DENSITY,
@@ -103,7 +104,7 @@ fn build(params: &Params, paths: u32, second_stage: Option<u32>) -> Box<dyn Inte
     let optimizer = bidirectional::optimizer(params);
     macro_rules! with_factor {
         ($factor:ty) => {
-            with_path_fallback(
+            with_fallback(
                 params,
                 Bidirectional::new(common, CacheStrategy::<$factor>::new(settings)).with_optimizer(optimizer),
             )

@@ -3,7 +3,7 @@
 use super::{ONE_STAGE, build_one_stage, params};
 use crate::integrators::IntegratorSpec;
 use crate::integrators::params::presampled::PRESAMPLED_PATHS;
-use crate::integrators::params::shared::{ALLOCATION, PATH_FALLBACK};
+use crate::integrators::params::shared::{ALLOCATION, FALLBACK};
 
 /// The registry's line.
 pub static PCBPT: IntegratorSpec = IntegratorSpec {
@@ -15,7 +15,7 @@ pub static PCBPT: IntegratorSpec = IntegratorSpec {
         tracing, which ignore resampling; `ris` is the same method with better weights.\n\n\
         Popov, Ramamoorthi, Durand and Drettakis 2015, \"Probabilistic connections for bidirectional path tracing\". As \
         published: rr_scale=1, allocation=full.",
-    params: &[ONE_STAGE, &[PRESAMPLED_PATHS, params::weights("balance"), ALLOCATION, PATH_FALLBACK]],
+    params: &[ONE_STAGE, &[PRESAMPLED_PATHS, params::weights("balance"), ALLOCATION, FALLBACK]],
     unbiased: true,
     limitations: |_| None,
     build: build_one_stage,

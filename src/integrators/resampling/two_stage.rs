@@ -4,7 +4,7 @@
 use super::params;
 use crate::integrators::params::presampled::{CONNECTIONS_PER_VERTEX, RR_SCALE};
 use crate::integrators::params::shared::{
-    ALLOCATION, HIDE_EMITTERS, MAX_DEPTH, PATH_FALLBACK, RR_DEPTH_RESAMPLED, TECHNIQUES,
+    ALLOCATION, FALLBACK, GUIDED_EMISSION, HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_RESAMPLED, TECHNIQUES,
 };
 use crate::integrators::{IntegratorSpec, ParamSpec};
 
@@ -14,6 +14,7 @@ const PARAMS: &[ParamSpec] = &[
     RR_SCALE,
     HIDE_EMITTERS,
     TECHNIQUES,
+    GUIDED_EMISSION,
     params::FIRST_STAGE_PATHS,
     params::SECOND_STAGE_PATHS,
     params::FIRST_STAGE,
@@ -29,7 +30,7 @@ const PARAMS: &[ParamSpec] = &[
     params::UNSEEN_MODEL,
     params::TWO_STAGE_WEIGHTS,
     ALLOCATION,
-    PATH_FALLBACK,
+    FALLBACK,
 ];
 
 /// The registry's line.
