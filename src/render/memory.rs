@@ -32,7 +32,7 @@ impl FilmMemory {
     pub fn bytes(&self) -> u64 {
         let [_, _, width, height] = self.window.map(u64::from);
         let techniques = self.pyramid_edges.map_or(0, Pyramid::techniques_up_to) as u64;
-        let per_film = FILM_BYTES + TECHNIQUE_BYTES.saturating_mul(techniques);
+        let per_film = TECHNIQUE_BYTES.saturating_mul(techniques).saturating_add(FILM_BYTES);
         // The sum of all films is one more.
         let per_pixel = per_film.saturating_mul(self.films as u64 + 1).saturating_add(PICTURE_BYTES);
         width.saturating_mul(height).saturating_mul(per_pixel)

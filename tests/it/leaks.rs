@@ -26,6 +26,8 @@ fn ball() -> String {
         let (polar, azimuth) =
             (PI * f64::from(i / slices) / f64::from(rings), TAU * f64::from(i % slices) / f64::from(slices));
         let ((sin, cos), (s, c)) = (polar.sin_cos(), azimuth.sin_cos());
+        // π is not exact: without rounding the vertices of a pole would not be one point.
+        let sin = if i / slices == rings { 0.0 } else { sin };
         format!("v {} {} {}\n", sin * c, sin * s, cos)
     };
     let face = |i: u32| {
