@@ -47,8 +47,13 @@ fn the_path_tracer_agrees_with_mitsuba() {
     for name in GALLERY {
         // Balls and tubes are triangles here and formulas there.
         let tolerance = if ["glass", "normals", "principled"].contains(&name) { 0.01 } else { 0.0 };
-        let ours = Picture::render(&path::SPEC, &prepared(exhibit(name)), &[], SPP, 2);
-        ours.assert_agrees(&mitsuba(name), tolerance, name);
+        let scene = prepared(exhibit(name));
+        let ours = Picture::render(&path::SPEC, &scene, &[], SPP, 2);
+        // One of very many pixels may differ by chance; what is really different is so at four times the samples.
+        if let Some(difference) = ours.difference(&mitsuba(name), tolerance) {
+            let closer = Picture::render(&path::SPEC, &scene, &[], 4 * SPP, 1002);
+            closer.assert_agrees(&mitsuba(name), tolerance, &format!("{name}: {difference}, and again"));
+        }
     }
 }
 

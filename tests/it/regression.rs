@@ -207,7 +207,9 @@ fn the_second_face_of_a_thin_sheet_is_not_skipped() {
         let scene = prepare(parse(&xml, &[]), Backend::default_available(), None);
         for spec in unbiased().filter(|s| takes(s, &scene)) {
             let picture = Picture::render(spec, &scene, &[], 1024, 1);
-            assert!((picture.whole.0 - 0.25).abs() < 0.02, "{} {gap}: {}", spec.name, picture.whole.0);
+            // Few light sub-paths begin where the camera looks: light tracing has more noise.
+            let tolerance = 4.0 * picture.whole.1.sqrt() + 0.005;
+            assert!((picture.whole.0 - 0.25).abs() < tolerance, "{} {gap}: {:?}", spec.name, picture.whole);
         }
     }
 }

@@ -123,7 +123,7 @@ pub const GUIDED_EMISSION: ParamSpec = ParamSpec {
     unit: "",
     short: "Light sub-paths of sun and sky begin where they matter",
     long: "In a scene with lights at infinity (sun, sky, environment maps, directional lights), eye sub-paths before the \
-        first iteration find rays of light that bring light to the picture, through the windows of a room for example. \
+        first iteration find the rays that light the picture, through the windows of a room for example. \
         Light sub-paths then begin with such rays more often, and the weights count that. The expected picture is the \
         same. Choose `false` to repeat published methods.",
 };

@@ -53,6 +53,7 @@ fn slips_are_explained() {
 const EARLIER: &[(&str, [&str; 2], [&str; 2])] = &[
     ("bdpt", ["skip", "never"], ["allocation", "full"]),
     ("bdpt", ["skip", "auto"], ["allocation", "auto"]),
+    ("bdpt", ["path_fallback", "false"], ["fallback", "false"]),
     ("pcbpt", ["paths", "100"], ["presampled_paths", "100"]),
     ("pcbpt", ["weights", "ris"], ["weights", "resampling-aware"]),
     ("ris", ["paths", "1"], ["presampled_paths", "1"]),
