@@ -6,7 +6,7 @@
 //!
 //! A point that is met within its rounding error of an edge may be behind the surface that is joined there: the next ray
 //! would start outside of a closed body. Such a point is moved into its triangle, to [`EDGE_MARGIN`] times its error bound
-//! from the edge. Edges inside of flat regions ([`flat_edges`]) join no other surface: points stay on them.
+//! from the edge. Edges inside of flat regions (`flat_edges`) join no other surface: points stay on them.
 
 use super::MeshShading;
 use super::flat_edges::flat_edges;
