@@ -81,7 +81,7 @@ impl PreparedScene {
 
     /// [`PreparedScene::surface_point`] in place, for loops: moving what has just been written in pieces stalls the
     /// processor.
-    #[inline]
+    #[inline(always)]
     pub fn surface_point_into(&self, hit: &Hit, point: &mut SurfacePoint) -> &Material {
         let mesh = self.triangles.mesh(hit);
         let triangle = self.triangles.triangle(mesh, hit);
