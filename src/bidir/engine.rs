@@ -149,13 +149,13 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
         self.mis.factor = self.strategy.factor();
     }
 
-    /// What happens before the first iteration knows the scene, the seed and the limits.
+    /// Access of warm-ups to the scene, the seed, the limits and the distribution of emission.
     fn warm_up<'a>(mis: &'a MisContext<S::Factor>, iteration: &Iteration<'a>) -> WarmUp<'a> {
         let MisContext { eye_limits, light_limits, ref emission, .. } = *mis;
         WarmUp { iteration: iteration.with_index(0), eye_limits, light_limits, emission }
     }
 
-    /// Guides the rays of lights, once; the guide is a function of scene, seed and limits alone.
+    /// Guides the rays of lights, once; the guide is a function of scene, seed and longest path alone.
     fn train_emission(&mut self, iteration: &Iteration) -> RayStats {
         if !std::mem::take(&mut self.train_emission) || !self.mis.techniques.uses_light_paths() {
             return RayStats::default();
@@ -164,8 +164,11 @@ impl<S: ConnectionStrategy> Bidirectional<S> {
             true => TrainingPaths::Indirect,
             false => TrainingPaths::Scattered,
         };
-        let (emission, stats) = Self::warm_up(&self.mis, iteration).train_emission(paths);
+        let mut phases = Phases::default();
+        let warm_up = Self::warm_up(&self.mis, iteration);
+        let (emission, mut stats) = phases.time("guided emission", || warm_up.train_emission(paths));
         self.mis.emission = emission;
+        stats.phases.merge(&phases);
         stats
     }
 

@@ -43,14 +43,14 @@ pub struct EmissionRecord {
 /// in equal parts: what the records missed is still sampled.
 const POWER_SHARE: f64 = 0.2;
 const EQUAL_SHARE: f64 = 0.05;
-/// Of the rays of a light at infinity this part is not guided.
+/// Part of the rays of a light at infinity that is not guided.
 const UNGUIDED_SHARE: f64 = 0.2;
 /// A density with fewer points in a box is too noisy to follow.
 const MIN_POINTS: f64 = 12.0;
 /// 2^−18 of the unit cube: a box of a window that is a hundredth of the scene, seen in a hundredth of the directions.
 const MAX_DEPTH: u32 = 18;
 
-/// What was learnt.
+/// Learnt probabilities of lights and densities of their rays.
 #[derive(Debug)]
 struct Guide {
     by_learnt_share: AliasTable,
@@ -85,7 +85,8 @@ impl EmissionDistribution {
         EmissionDistribution(Some(Arc::new(Guide { by_learnt_share, rays })))
     }
 
-    /// It has learnt.
+    /// Emission is guided.
+    #[cfg(test)]
     pub fn is_guided(&self) -> bool {
         self.0.is_some()
     }
@@ -196,20 +197,24 @@ fn weighted_point(light: &Light, record: &EmissionRecord) -> Option<WeightedPoin
 fn light_weights(lights: &LightSet, records: &[EmissionRecord]) -> Vec<f32> {
     let mut learnt = vec![0.0; lights.len()];
     records.iter().for_each(|record| learnt[record.light.index()] += record.weight);
-    let near = |id: LightId| !lights.get(id).is_infinite();
-    let sum = |of: &dyn Fn(LightId) -> f64, those: &dyn Fn(LightId) -> bool| -> f64 {
-        lights.iter().map(|(id, _)| id).filter(|&id| those(id)).map(of).sum()
-    };
     let power = |id: LightId| f64::from(lights.pmf_light(id).0);
-    let near_power = sum(&power, &near);
-    let near_learnt = sum(&|id| learnt[id.index()], &near);
-    let all_learnt = sum(&|id| learnt[id.index()], &|_| true);
-    let groups = lights.infinite().iter().filter(|&&id| power(id) > 0.0).count() + usize::from(near_power > 0.0);
-    let weight = |id: LightId| {
-        let within = if near(id) { power(id) / near_power.max(f64::MIN_POSITIVE) } else { 1.0 };
-        let share = if near(id) { near_learnt } else { learnt[id.index()] } / all_learnt;
-        let learnt_share = (1.0 - POWER_SHARE - EQUAL_SHARE) * share + EQUAL_SHARE / groups as f64;
-        if power(id) > 0.0 { (POWER_SHARE * power(id) + learnt_share * within) as f32 } else { 0.0 }
+    // Sums over lights with a position.
+    let (mut near_power, mut near_learnt) = (0.0, 0.0);
+    for (id, _) in lights.iter().filter(|(_, light)| !light.is_infinite()) {
+        near_power += power(id);
+        near_learnt += learnt[id.index()];
+    }
+    let all_learnt: f64 = learnt.iter().sum();
+    let shining = lights.infinite().iter().filter(|&&id| power(id) > 0.0).count();
+    let equal_share = EQUAL_SHARE / (shining + usize::from(near_power > 0.0)) as f64;
+    let weight = |(id, light): (LightId, &Light)| {
+        // The light's part of its group, and what was learnt of the group.
+        let (part, group_learnt) = match light.is_infinite() {
+            true => (1.0, learnt[id.index()]),
+            false => (power(id) / near_power, near_learnt),
+        };
+        let learnt_share = (1.0 - POWER_SHARE - EQUAL_SHARE) * group_learnt / all_learnt;
+        if power(id) > 0.0 { (POWER_SHARE * power(id) + part * (learnt_share + equal_share)) as f32 } else { 0.0 }
     };
-    lights.iter().map(|(id, _)| weight(id)).collect()
+    lights.iter().map(weight).collect()
 }

@@ -6,6 +6,7 @@
 use crate::emit::DirectSample;
 use crate::ray::offset::{SegmentEnd, segment};
 use crate::ray::{PACKET, RayKind, Segment, SegmentPacket, Tracer, Transmittance};
+
 /// The segment from the place `from` to a sampled point of a light.
 #[inline]
 pub fn direct_segment(from: &SegmentEnd, light: &DirectSample) -> Segment {

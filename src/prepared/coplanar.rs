@@ -127,7 +127,7 @@ impl Emitters {
                 let facet = &self.facets[emitter];
                 let tolerance = facet.tolerance().max(other.tolerance());
                 let above = own.filter(|_| facet.normal.dot(other.normal) > 0.0);
-                // Of two that emit to one side the later one moves.
+                // Two that emit to one side: the later one moves.
                 if own == Some(emitter) || above.is_some_and(|a| a > emitter) || !facet.lies_in(other, tolerance) {
                     continue;
                 }

@@ -75,7 +75,7 @@ fn edges(scene: &PreparedScene) -> Vec<[Vec3; 2]> {
         edges.extend((0..1000).map(|i| [shape.point_of(shape.sample_unit(along(i))).p; 2]));
     }
     let middle = -scene.centre.as_vec3();
-    // What is elsewhere only moves the body away from the scene's centre.
+    // Geometry elsewhere only moves the body away from the scene's centre.
     let is_body = |mesh: &&MeshBuffers| mesh.positions.iter().all(|p| p.distance(middle) < 2.0);
     for mesh in scene.geometry.meshes.iter().filter(is_body) {
         for i in 0..mesh.triangles.len() as u32 {

@@ -161,7 +161,7 @@ fn emitters_with_holes_emit_and_let_light_through() {
         expected.whole = (alone.whole.0 + behind.whole.0, alone.whole.1 + behind.whole.1);
         all_agree(&masked, &expected, &format!("emitter that lets {share} through"));
     }
-    // What the camera sees of them itself: its own emission and 0.6 of that behind.
+    // Light that the camera sees of them: their own emission and 0.6 of that behind.
     let camera = r#"<sensor type="perspective"><float name="fov" value="20"/>
         <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
         <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/><rfilter type="box"/></film>
@@ -226,7 +226,7 @@ fn weights_count_the_masks_on_every_edge() {
     }
 }
 
-/// What auxiliary layers show is behind holes, at its own distance.
+/// Auxiliary layers show surfaces behind holes, at their own distance.
 #[test]
 fn the_first_surface_is_behind_the_holes() {
     let all_holes = black_mask(r#"<float name="opacity" value="0"/>"#);

@@ -46,8 +46,8 @@ fn emission_is_inverted() {
     }
 }
 
-/// Of guided rays, the mean quotient of unguided and guided density is one, in every region; evaluated densities are
-/// the sampled ones; rays through the window are drawn much more often.
+/// The mean quotient of unguided and guided density over guided rays is one, in every region; evaluated densities are the
+/// sampled ones; rays through the window are drawn much more often.
 #[test]
 fn guided_densities_agree_with_their_samples() {
     let n = 40_000;

@@ -18,7 +18,7 @@ pub(super) fn refusal(element: &str, plugin: &str) -> Option<&'static str> {
     rows().find(|row| row[..3] == [element, plugin, ""] && row[3] == "refused").map(|row| row[5])
 }
 
-/// What is done with a documented parameter that no reader asks for.
+/// Treatment of a documented parameter that no reader asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unread {
     /// It does not change the expected picture.

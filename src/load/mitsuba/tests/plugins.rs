@@ -129,7 +129,7 @@ fn names_that_nobody_documents_are_warned_of() {
     assert_eq!(messages(load(&scene(inside))), [("scene::unknown-property", 2, 35)]);
 }
 
-/// What stands for an integrator is rendered by the nearest one here.
+/// Kinds of integrators that are missing here are rendered by the nearest one, and the others are errors.
 #[test]
 fn integrators_are_translated() {
     let integrator = |xml: &str| good(xml).integrator.unwrap();
