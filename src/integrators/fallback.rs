@@ -36,6 +36,10 @@ const PREDICTION_EXCESS: f64 = 36.0;
 /// the method's. Where it is more, next event and short connections find so little that sharing light sub-paths pays.
 const HOPELESS: f64 = 16.0;
 
+/// Bidirectional path tracing is not probed where path tracing's product is so many times less than the method's: then
+/// connections gain little, and two iterations of it would cost more than they could save.
+const CLEARLY_BETTER: f64 = 2.0;
+
 /// Bidirectional path tracing is trusted if its picture is no darker than this, relative to the method's.
 const LEAST_BRIGHTNESS: f64 = 0.9;
 
@@ -109,8 +113,16 @@ impl<S: ConnectionStrategy> Fallback<S> {
         }
         let probe = self.path.probe(iteration);
         let measured = measured_variance(&probe, &method) * probe.rays;
+        // Path tracing that sees all light, with no less than the variance that `predicted` allows.
+        let is_blind = PathTracer::is_blind(iteration.scene.features);
+        let path_product = |predicted: Option<f64>| match predicted {
+            Some(variance) if !is_blind => measured.max(variance / PREDICTION_EXCESS * probe.rays),
+            _ => f64::INFINITY,
+        };
         let (mut stats, mut least, mut predicted) = (probe.stats, method.product(), method.errors.eye_only);
+        let path_excels = CLEARLY_BETTER * path_product(predicted) < least;
         if measured < HOPELESS * least
+            && !path_excels
             && let Some(bdpt) = self.probe_bdpt(iteration, &mut stats)
             && finds_as_much(&bdpt, &method)
         {
@@ -119,8 +131,7 @@ impl<S: ConnectionStrategy> Fallback<S> {
                 (self.choice, least) = (Choice::Bdpt, bdpt.product());
             }
         }
-        let trusted = predicted.map_or(f64::INFINITY, |variance| variance / PREDICTION_EXCESS * probe.rays);
-        if !PathTracer::is_blind(iteration.scene.features) && measured.max(trusted) < least {
+        if path_product(predicted) < least {
             self.choice = Choice::Path;
         }
         stats
