@@ -3,7 +3,7 @@
 //! The library is a row of rooms; each imports only rooms that stand before it in this list (a test enforces it):
 //!
 //! ```text
-//! math → image → scene → load → ray → shade → spatial → emit → prepared → skeleton → path → mis → film → bidir → integrators → render → measure → app
+//! math → image → scene → load → ray → shade → media → spatial → emit → prepared → skeleton → path → mis → film → bidir → integrators → render → measure → app
 //! ```
 //!
 //! Data flows one way and can be read in [`render::job::render`], which is the table of contents of the program:
@@ -52,6 +52,7 @@ pub mod scene;
 pub mod load;
 pub mod ray;
 pub mod shade;
+pub mod media;
 pub mod spatial;
 pub mod emit;
 pub mod prepared;

@@ -32,10 +32,11 @@ impl LightVertex {
     /// The vertex's BSDF, which `pool` holds.
     #[inline]
     pub fn bsdf_in<'a>(&'a self, pool: &'a BsdfPool) -> BsdfView<'a> {
-        match self.place {
-            StoredPlace::Surface { ng, .. } => pool.get(&self.bsdf, ng),
-            StoredPlace::Medium(medium) => match medium {},
-        }
+        let ng = match self.place {
+            StoredPlace::Surface { ng, .. } => ng,
+            StoredPlace::Medium(_) => Vec3::ZERO,
+        };
+        pool.get(&self.bsdf, ng)
     }
 
     /// q̂₂/p and q̂₁/p at a surface at `p` on the side of the unit normal `n`, visibility taken for granted. `bsdf` is

@@ -32,6 +32,7 @@ pub(super) fn camera(scene: &SceneDesc, options: &CameraOptions) -> Result<Senso
         far_clip: extent * 10.0,
         aperture_radius: 0.0,
         focus_distance: extent,
+        medium: None,
         film: FilmDesc { width, height, crop: None, filter: FilterDesc::Gaussian { stddev: 0.5 }, span: None },
         sample_count: None,
         span: None,

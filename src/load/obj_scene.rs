@@ -201,6 +201,7 @@ impl Model {
             to_world: DMat4::IDENTITY,
             bsdf: Some(bsdf),
             emission,
+            interface: None,
             flip_normals: false,
             name: None,
             span,

@@ -24,7 +24,7 @@ pub struct Interior {
 impl Interior {
     /// The scattering function.
     pub fn scatter(&self) -> Scatter<'_> {
-        Scatter::Bsdf(&self.bsdf)
+        Scatter(&self.bsdf)
     }
 
     /// The place.

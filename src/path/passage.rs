@@ -80,7 +80,7 @@ impl<'s> Passage<'s, '_> {
         }
         let bsdf = Bsdf::empty(self.point);
         let place = Place::Surface { point: self.point, hit: &self.hit };
-        let scatter = Scatter::Bsdf(&bsdf);
+        let scatter = Scatter(&bsdf);
         hooks.passing(&Vertex { index, place, scatter, wo: -self.ray.d, throughput, edge: self.edge });
     }
 }

@@ -2,9 +2,10 @@
 
 use crate::math::measure::area_jacobian;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
+use crate::media::MediumPoint;
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{Hit, Transmittance};
-use crate::shade::{Bsdf, BsdfSample, BsdfView, MediumPoint, Phase, SurfacePoint, Transport};
+use crate::shade::{Bsdf, BsdfSample, BsdfView, SurfacePoint, Transport};
 
 /// How a vertex was reached.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +77,7 @@ impl StoredPlace {
     pub fn position(&self) -> Vec3 {
         match *self {
             StoredPlace::Surface { p, .. } => p,
-            StoredPlace::Medium(medium) => match medium {},
+            StoredPlace::Medium(medium) => medium.p,
         }
     }
 
@@ -86,7 +87,7 @@ impl StoredPlace {
     pub fn cosine(&self, d: Vec3) -> f32 {
         match self {
             StoredPlace::Surface { ng, .. } => ng.dot(d),
-            StoredPlace::Medium(medium) => match *medium {},
+            StoredPlace::Medium(_) => 1.0,
         }
     }
 
@@ -98,7 +99,7 @@ impl StoredPlace {
         area_jacobian(self.cosine(d), distance2)
     }
 
-    /// The geometric normal on the side of the direction `d`.
+    /// The geometric normal on the side of the direction `d`; zero in a medium.
     #[inline]
     pub fn side_normal(&self, d: Vec3) -> Vec3 {
         match *self {
@@ -109,7 +110,7 @@ impl StoredPlace {
                     ng
                 }
             }
-            StoredPlace::Medium(medium) => match medium {},
+            StoredPlace::Medium(_) => Vec3::ZERO,
         }
     }
 
@@ -120,7 +121,7 @@ impl StoredPlace {
     pub fn height(&self, offset: Vec3) -> Option<(f32, f32)> {
         match *self {
             StoredPlace::Surface { error, ng, .. } => Some((ng.dot(offset).abs(), error)),
-            StoredPlace::Medium(medium) => match medium {},
+            StoredPlace::Medium(_) => None,
         }
     }
 
@@ -129,7 +130,7 @@ impl StoredPlace {
     pub fn segment_end(&self) -> SegmentEnd {
         match *self {
             StoredPlace::Surface { p, error, ng } => SegmentEnd::Surface { p, error, ng },
-            StoredPlace::Medium(medium) => match medium {},
+            StoredPlace::Medium(medium) => SegmentEnd::Free(medium.p),
         }
     }
 }
@@ -140,7 +141,7 @@ impl Place<'_> {
     pub fn stored(&self) -> StoredPlace {
         match self {
             Place::Surface { point, .. } => StoredPlace::Surface { p: point.p, error: point.error, ng: point.ng },
-            Place::Medium(medium) => match **medium {},
+            Place::Medium(medium) => StoredPlace::Medium(**medium),
         }
     }
 
@@ -155,7 +156,7 @@ impl Place<'_> {
     pub fn normal(&self) -> Vec3 {
         match self {
             Place::Surface { point, .. } => point.ng,
-            Place::Medium(medium) => match **medium {},
+            Place::Medium(_) => Vec3::ZERO,
         }
     }
 
@@ -215,21 +216,13 @@ scattering!(Bsdf, BsdfView<'_>);
 
 /// The scattering function of a vertex that a walk has just made.
 #[derive(Clone, Copy, Debug)]
-pub enum Scatter<'a> {
-    /// Scattering at a surface.
-    Bsdf(&'a Bsdf),
-    /// Scattering in a medium.
-    Phase(&'a Phase),
-}
+pub struct Scatter<'a>(pub &'a Bsdf);
 
 impl<'a> Scatter<'a> {
-    /// The BSDF of a surface vertex.
+    /// The scattering function itself.
     #[inline]
     pub fn bsdf(&self) -> &'a Bsdf {
-        match *self {
-            Scatter::Bsdf(bsdf) => bsdf,
-            Scatter::Phase(phase) => match *phase {},
-        }
+        self.0
     }
 
     /// Draws a direction; `u` are three numbers in [0, 1).

@@ -132,7 +132,7 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
         }
         material.resolve_into(&mut bsdf, &point, wo);
         let place = Place::Surface { point: &point, hit: &hit };
-        let vertex = Vertex { index, place, scatter: Scatter::Bsdf(&bsdf), wo, throughput, edge: &edge };
+        let vertex = Vertex { index, place, scatter: Scatter(&bsdf), wo, throughput, edge: &edge };
         if !hooks.vertex(&vertex, tracer, sampler) || index == limits.max_edges {
             return;
         }

@@ -3,7 +3,7 @@
 
 use super::placing::{bounds, bounds_of};
 use crate::math::DVec3;
-use crate::scene::{BsdfKind, EmitterKind, GroupDesc, SceneDesc, SensorDesc};
+use crate::scene::{BsdfKind, EmitterKind, GroupDesc, SceneDesc, SensorDesc, VolumeDesc};
 use glam::DMat4;
 use std::ops::RangeInclusive;
 
@@ -37,6 +37,14 @@ fn scale_scene(desc: &mut SceneDesc, scale: f64) {
     for bsdf in &mut desc.bsdfs {
         if let BsdfKind::BumpMap { scale: height, .. } = &mut bsdf.kind {
             *height = (f64::from(*height) * scale) as f32;
+        }
+    }
+    for medium in &mut desc.media {
+        medium.scale = (f64::from(medium.scale) / scale) as f32;
+        for volume in [&mut medium.sigma_t, &mut medium.albedo] {
+            if let VolumeDesc::Grid(grid) = volume {
+                grid.to_world = larger * grid.to_world;
+            }
         }
     }
     let squared = |intensity: &mut crate::math::Rgb| {

@@ -5,6 +5,7 @@
 
 use super::bsdf::BsdfDesc;
 use super::diag::{Diagnostic, Span};
+use super::medium::{InterfaceDesc, MediumDesc};
 use crate::image::Image;
 use crate::math::Rgb;
 use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
@@ -34,6 +35,8 @@ id_type!(/// Index into [`SceneDesc::meshes`].
     MeshId);
 id_type!(/// Index into [`SceneDesc::groups`].
     GroupId);
+id_type!(/// Index into [`SceneDesc::media`].
+    MediumId);
 
 /// A whole scene.
 #[derive(Debug, Default)]
@@ -62,6 +65,8 @@ pub struct SceneDesc {
     pub instances: Vec<InstanceDesc>,
     /// Lights that are not surfaces.
     pub emitters: Vec<EmitterDesc>,
+    /// Participating media.
+    pub media: Vec<MediumDesc>,
 }
 
 /// A camera with its film.
@@ -83,6 +88,8 @@ pub struct SensorDesc {
     pub aperture_radius: f64,
     /// Distance along the viewing axis of the plane in focus; used with a lens only.
     pub focus_distance: f64,
+    /// The medium that the camera is in; vacuum if there is none.
+    pub medium: Option<MediumId>,
     /// The film.
     pub film: FilmDesc,
     /// Samples per pixel that the file asks for.
@@ -314,6 +321,8 @@ pub struct ShapeDesc {
     pub bsdf: Option<BsdfId>,
     /// The emitted radiance, if it emits.
     pub emission: Option<AreaEmission>,
+    /// The media on both sides, if the surface separates media.
+    pub interface: Option<InterfaceDesc>,
     /// Turns the surface inside out.
     pub flip_normals: bool,
     /// `id` in the file.

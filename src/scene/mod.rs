@@ -4,8 +4,10 @@
 pub mod bsdf;
 pub mod desc;
 pub mod diag;
+pub mod medium;
 pub mod validate;
 
 pub use bsdf::*;
 pub use desc::*;
 pub use diag::{Diagnostic, Diagnostics, Severity, Span};
+pub use medium::*;

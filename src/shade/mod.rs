@@ -10,12 +10,12 @@
 //! * A delta lobe never shows in `eval` or `pdf`, only in `sample`, where its density is a discrete probability.
 
 pub mod bsdf;
-pub mod medium;
+pub mod phase;
 pub mod point;
 pub mod texture;
 
 pub use bsdf::{Bsdf, BsdfPool, BsdfSample, BsdfView, Features, Material, MaterialSet, StoredBsdf};
-pub use medium::{MediumPoint, Phase};
+pub use phase::{Phase, PhaseLobe, PhaseScattering};
 pub use point::SurfacePoint;
 pub use texture::{ColorTexture, ScalarTexture, Texture, TextureSet};
 

@@ -13,6 +13,7 @@ pub(super) fn sensor(aperture_radius: f64) -> SensorDesc {
         far_clip: 100.0,
         aperture_radius,
         focus_distance: 4.0,
+        medium: None,
         film: FilmDesc { width: 30, height: 20, crop: None, filter: FilterDesc::Box, span: None },
         sample_count: None,
         span: None,

@@ -70,6 +70,7 @@ impl Builder<'_> {
             far_clip,
             aperture_radius,
             focus_distance,
+            medium: None,
             film,
             sample_count,
             span: Some(p.span()),

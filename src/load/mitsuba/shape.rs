@@ -149,7 +149,8 @@ impl Builder<'_> {
         let to_world = outline.to_world;
         let geometry = self.geometry(outline, emission.is_some());
         let name = p.element().attr("id").map(|a| a.value.clone());
-        Some(ShapeDesc { geometry, to_world, bsdf, emission, flip_normals, name, span: Some(p.span()) })
+        let (interface, span) = (None, Some(p.span()));
+        Some(ShapeDesc { geometry, to_world, bsdf, emission, interface, flip_normals, name, span })
     }
 
     /// The outline that the plugin itself describes.

@@ -33,7 +33,7 @@ pub use features::Features;
 pub use material::{Material, MaterialSet};
 pub use view::BsdfView;
 
-use super::{SurfacePoint, Transport};
+use super::{PhaseScattering, SurfacePoint, Transport};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
 use arrayvec::ArrayVec;
 use nested_frame::NestedFrame;
@@ -91,6 +91,15 @@ impl Bsdf {
             lobes: ArrayVec::new(),
             frames: ArrayVec::new(),
         }
+    }
+
+    /// Makes it the scattering function of a point of a medium.
+    #[inline]
+    pub fn set_phase(&mut self, phase: PhaseScattering) {
+        self.ng = Vec3::ZERO;
+        self.scattering = Scattering::Phase(phase);
+        self.lobes.clear();
+        self.frames.clear();
     }
 
     /// Starts over at `point`, without lobes.

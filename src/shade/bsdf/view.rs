@@ -7,7 +7,7 @@ use super::model::{DeltaSample, LobeSample};
 use super::nested_frame::{self, LocalDirections, NestedFrame, ROOT};
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Frame, Rgb, SolidAnglePdf, Vec3};
-use crate::shade::Transport;
+use crate::shade::{PhaseScattering, Transport};
 use std::f32::consts::FRAC_1_PI;
 
 /// A BSDF whose lobes and frames are borrowed, from a [`Bsdf`](super::Bsdf) or a [`BsdfPool`](super::BsdfPool).
@@ -31,6 +31,8 @@ pub(super) enum Scattering {
     Lambertian(Lambert),
     /// A sum of lobes.
     Lobes(LobeSum),
+    /// A point of a medium: lobes and frames are empty, and there is no surface.
+    Phase(PhaseScattering),
 }
 
 /// Frame and normalisation of a sum of lobes.
@@ -118,6 +120,7 @@ impl BsdfView<'_> {
                 (value, SolidAnglePdf(pdf))
             }
             Scattering::Lobes(sum) => self.eval_and_pdf_lobes(sum, wo, wi, mode),
+            Scattering::Phase(phase) => phase.eval_and_pdf(wo, wi),
         }
     }
 
@@ -147,6 +150,7 @@ impl BsdfView<'_> {
                 SolidAnglePdf(lambert.cosines(wo, wi).map_or(0.0, |(_, cos_i)| cos_i * FRAC_1_PI))
             }
             Scattering::Lobes(sum) => SolidAnglePdf(self.pdf_lobes(sum, wo, wi)),
+            Scattering::Phase(phase) => SolidAnglePdf(phase.phase.eval(wo, wi)),
         }
     }
 
@@ -167,6 +171,7 @@ impl BsdfView<'_> {
         match self.scattering {
             Scattering::Lambertian(lambert) => self.smooth_sample(wo, lambert.sample_direction(u), 1.0, mode),
             Scattering::Lobes(sum) => self.sample_lobes(sum, wo, u, mode),
+            Scattering::Phase(phase) => phase.sample(wo, u),
         }
     }
 
@@ -261,8 +266,10 @@ impl BsdfView<'_> {
     /// whichever side the point is reached.
     #[inline]
     pub fn albedo(&self) -> Rgb {
-        if let Scattering::Lambertian(lambert) = self.scattering {
-            return lambert.reflectance;
+        match self.scattering {
+            Scattering::Lambertian(lambert) => return lambert.reflectance,
+            Scattering::Phase(phase) => return Rgb::grey(phase.albedo),
+            Scattering::Lobes(_) => {}
         }
         let of_side =
             |s: usize| -> Rgb { self.lobes.iter().filter(|l| l.active[s]).map(|l| l.lobe.albedo() * l.weight).sum() };
@@ -282,6 +289,7 @@ impl BsdfView<'_> {
         match self.scattering {
             Scattering::Lambertian(lambert) => !lambert.reflectance.is_black(),
             Scattering::Lobes(_) => self.lobes.iter().any(|l| l.lobe.is_smooth()),
+            Scattering::Phase(phase) => !phase.sigma_s.is_black(),
         }
     }
 
@@ -291,13 +299,14 @@ impl BsdfView<'_> {
         match self.scattering {
             Scattering::Lambertian(lambert) => lambert.reflectance.is_black(),
             Scattering::Lobes(_) => self.lobes.is_empty(),
+            Scattering::Phase(phase) => phase.sigma_s.is_black(),
         }
     }
 
-    /// True if light from the other side than `wo`'s may contribute.
+    /// True if light from the other side than `wo`'s may contribute; in a medium there are no sides.
     #[inline]
     pub fn transmits(&self) -> bool {
-        self.lobes.iter().any(|l| l.active[0] && l.active[1])
+        matches!(self.scattering, Scattering::Phase(_)) || self.lobes.iter().any(|l| l.active[0] && l.active[1])
     }
 }
 
