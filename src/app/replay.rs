@@ -6,6 +6,7 @@ use super::environment::Environment;
 use crate::integrators::Iteration;
 use crate::integrators::replay::{ContributionRecord, Replay, VertexRecord};
 use crate::math::{Rgb, Vec3};
+use crate::path::StoredPlace;
 use crate::prepared::PreparedScene;
 use crate::render::job;
 
@@ -61,14 +62,26 @@ fn print(replay: &Replay, scene: &PreparedScene) {
 }
 
 fn vertex(letter: char, i: usize, v: &VertexRecord, scene: &PreparedScene) {
-    let p = &v.interior.point;
-    out!("  {letter}{i} at {}  normal {:.4}  shading normal {:.4}", point(p.p, scene), p.ng, p.frame.n);
+    let place = &v.interior.place;
+    let at = point(place.position(), scene);
+    match (place, v.shading_normal) {
+        (StoredPlace::Surface { ng, .. }, Some(n)) => {
+            out!("  {letter}{i} at {at}  normal {ng:.4}  shading normal {n:.4}");
+        }
+        (StoredPlace::Surface { ng, .. }, None) => out!("  {letter}{i} at {at}  normal {ng:.4}"),
+        (StoredPlace::Medium(medium), _) => {
+            out!(
+                "  {letter}{i} at {at}  in a medium of extinction {}",
+                rgb(medium.sigma_t * (1.0 / scene.unit as f32))
+            );
+        }
+    }
     out!(
         "     edge {:.6e} long, pdf {:.6e} /sr, survival {:.4}, cos {:.4}; throughput {}; albedo {}{}",
         f64::from(v.distance) * scene.unit,
         v.pdf.0,
         v.survival,
-        p.ng.dot(v.wo),
+        place.cosine(v.wo),
         rgb(v.throughput),
         rgb(v.interior.bsdf.albedo()),
         match v.interior.delta {

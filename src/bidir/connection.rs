@@ -6,7 +6,7 @@ use super::scratch::ContributionSink;
 use super::strategy::{Candidate, ConnectionStrategy};
 use crate::math::{AreaPdf, Rgb, Vec3};
 use crate::mis::{ConnectedPath, ConnectionFactor, EndpointPdfs, IncidentSubpath, ResamplingTarget};
-use crate::path::{DirectionSampler, StoredPlace, Vertex};
+use crate::path::{DirectionSampler, StoredPlace, Vertex, segment_flight};
 use crate::ray::offset::segment;
 use crate::ray::{Tracer, Work};
 use crate::shade::Transport;
@@ -45,12 +45,17 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         if raw.is_black() {
             return;
         }
+        let segment = segment(&z.segment_end(), &y.place.segment_end());
+        let (scene, medium) = (self.rules.iteration.scene, vertex.medium_towards(to_light));
+        let Some(passing) = segment_flight(scene, &segment, medium, tracer) else { return };
+        let flight = passing.edge(Some(&y.place), Some(&z));
+        raw *= passing.light;
         let eye_pdf = eye_pdf.0 * mis.eye_limits.survival(vertex.index, &vertex.scatter);
         let light_pdf = light_pdf.0 * y.survival;
         let (value, pdf_rev_prev) = self.reverse_scatter(vertex, to_light);
         let edge_before = self.edge_before(vertex, to_light);
         let scattered = y.throughput * at_light;
-        let throughput = scattered * (1.0 / light_pdf);
+        let throughput = scattered * flight.throughput() * (1.0 / light_pdf);
         let jacobian_z = z.area_jacobian(to_light, dist2);
         let (connection_factor, share) = if S::Factor::IS_ONE {
             (1.0, 1.0)
@@ -69,19 +74,18 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         let path = ConnectedPath {
             light: to.pdfs,
             light_end: EndpointPdfs {
-                pdf_rev: AreaPdf(eye_pdf * y.place.area_jacobian(to_light, dist2)),
+                pdf_rev: AreaPdf(eye_pdf * y.place.area_jacobian(to_light, dist2) * flight.rate_back),
                 pdf_rev_prev: mis.directions.pdf(q, &to.bsdf, -to_light, y.wo, Transport::Radiance),
             },
             eye: self.pdfs.pdfs.first(t),
-            eye_end: EndpointPdfs { pdf_rev: AreaPdf(light_pdf * jacobian_z), pdf_rev_prev },
+            eye_end: EndpointPdfs { pdf_rev: AreaPdf(light_pdf * jacobian_z * flight.rate), pdf_rev_prev },
             emitter: to.emitter,
-            connection_factor,
+            connection_factor: connection_factor / passing.transmittance.share(),
             reverse: self.reverse_path(t, edge_before, throughput, value),
         };
         let started = tracer.begin(Work::Weights);
         let weight = mis.weight(&path);
         tracer.end(Work::Weights, started);
-        let segment = segment(&z.segment_end(), &y.place.segment_end());
         let origin = to.number.map_or(PathOrigin::Known(to.origin), PathOrigin::Stored);
         let contribution = self.contribution((y.length(), t), origin, (raw, weight), Some(&segment));
         let (sink, heuristic) = (&mut *self.sink, mis.heuristic);

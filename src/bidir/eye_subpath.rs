@@ -16,7 +16,10 @@ use crate::mis::{
     AdjacentVertices, ConnectedPath, ConnectionFactor, EmitterFactors, EndpointPdfs, EyeSubpathPdfs, MisContext,
     MisWeight, PathEnd, ReversePath, VertexPdfs, next_event_factor,
 };
-use crate::path::{DirectionSampler, Edge, Iteration, Origin, Scattering, Vertex, WalkHooks, direct_segment};
+use crate::path::{
+    DirectionSampler, Edge, Iteration, Origin, Scattering, SegmentFlight, Vertex, WalkHooks, direct_segment,
+    segment_flight,
+};
 use crate::ray::{Segment, Tracer, Work};
 use crate::shade::{BsdfSample, Transport};
 
@@ -93,12 +96,13 @@ struct DirectConnection<'a> {
     emission: (AreaPdf, SolidAnglePdf),
     /// Probability of the light as origin of a light sub-path.
     origin_pmf: Pmf,
+    flight: &'a SegmentFlight,
     is_delta: bool,
 }
 
 impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
     /// A contribution of the technique (s, t), with its value and weight as if all light passed the masks on its
-    /// connection, `segment`; written down if there is a replay.
+    /// connection, `segment`, in scenes without media; written down if there is a replay.
     pub(super) fn contribution(
         &mut self,
         (s, t): (usize, usize),
@@ -161,7 +165,12 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
             emitter: EmitterFactors { can_be_hit: true, next_event },
             connection_factor: 1.0,
             // No connection ends at the light.
-            reverse: self.reverse_path(t, EdgeOf::<S>::default(), origin.throughput, Rgb::BLACK),
+            reverse: self.reverse_path(
+                t,
+                EdgeOf::<S>::default(),
+                origin.throughput * edge.flight.throughput_back(),
+                Rgb::BLACK,
+            ),
         });
         let contribution =
             self.contribution((0, t), PathOrigin::Known(Some(origin)), (throughput * emitted, weight), None);
@@ -192,10 +201,12 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
     fn direct(&mut self, vertex: &Vertex, id: LightId, pmf: Pmf, sample: &DirectSample, tracer: &mut Tracer) {
         let (t, scene) = (vertex.index as usize + 1, self.rules.iteration.scene);
         let Some(direct) = DirectLight::new(vertex, &self.rules.mis.directions, sample, pmf) else { return };
-        let raw = direct.raw;
-        if raw.is_black() {
+        if direct.raw.is_black() {
             return;
         }
+        let segment = direct_segment(&vertex.place.segment_end(), sample);
+        let Some(flight) = segment_flight(scene, &segment, vertex.medium_towards(sample.wi), tracer) else { return };
+        let raw = direct.raw * flight.light;
         let light = scene.lights.get(id);
         let distribution = &self.rules.mis.emission;
         let (position, emission) = distribution.pdf_ray_at_sample(&scene.lights, id, sample, vertex.position());
@@ -216,11 +227,11 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
                 origin,
                 emission: (position, emission),
                 origin_pmf,
+                flight: &flight,
                 is_delta: light.is_delta(),
             },
         );
         tracer.end(Work::Weights, started);
-        let segment = direct_segment(&vertex.place.segment_end(), sample);
         let origin = PathOrigin::Known(Some(origin));
         let contribution = self.contribution((1, t), origin, (raw, weight), Some(&segment));
         let (sink, heuristic) = (&mut *self.sink, self.rules.mis.heuristic);
@@ -230,7 +241,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
     }
 
     fn direct_weight(&self, vertex: &Vertex, connection: &DirectConnection) -> MisWeight {
-        let DirectConnection { sample, light, origin, emission, origin_pmf, is_delta } = connection;
+        let DirectConnection { sample, light, origin, emission, origin_pmf, flight, is_delta } = connection;
         let (t, mis, place) = (vertex.index as usize + 1, &self.rules.mis, &vertex.place);
         let (cos, dist2) = (place.cosine(sample.wi), sample.distance * sample.distance);
         let (position, emission) = *emission;
@@ -240,6 +251,8 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
         let walked = light.scatter_pdf.0 * mis.eye_limits.survival(vertex.index, &vertex.scatter);
         let (value, pdf_rev_prev) = self.reverse_scatter(vertex, sample.wi);
         let edge = self.edge_before(vertex, sample.wi);
+        let edge_flight = flight.edge(None, Some(&place.stored()));
+        let next_vertex = sample.end.pdf_next_vertex(position, emission, cos, dist2);
         mis.weight(&ConnectedPath {
             light: &[VertexPdfs::origin(origin_pdf)],
             light_end: EndpointPdfs {
@@ -247,13 +260,13 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
                 pdf_rev_prev: SolidAnglePdf(0.0),
             },
             eye: self.pdfs.pdfs.first(t),
-            eye_end: EndpointPdfs { pdf_rev: sample.end.pdf_next_vertex(position, emission, cos, dist2), pdf_rev_prev },
+            eye_end: EndpointPdfs { pdf_rev: AreaPdf(next_vertex.0 * edge_flight.rate), pdf_rev_prev },
             emitter: EmitterFactors {
                 can_be_hit: !is_delta,
                 next_event: next_event_factor(light.pdf, area_jacobian, origin_pdf),
             },
-            connection_factor: 1.0,
-            reverse: self.reverse_path(t, edge, origin.throughput, value),
+            connection_factor: 1.0 / flight.transmittance.share(),
+            reverse: self.reverse_path(t, edge, origin.throughput * edge_flight.throughput(), value),
         })
     }
 

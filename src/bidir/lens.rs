@@ -12,7 +12,7 @@ use crate::mis::{
     AdjacentVertices, ConnectedPath, ConnectionFactor, EndpointPdfs, MisWeight, ReversePath, ReverseTransport,
     VertexPdfs,
 };
-use crate::path::{DirectionSampler, Origin, Vertex};
+use crate::path::{DirectionSampler, Origin, Vertex, segment_flight};
 use crate::ray::offset::{SegmentEnd, segment};
 use crate::ray::{Segment, Tracer, Work};
 use crate::shade::Transport;
@@ -101,7 +101,14 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
         if raw.is_black() {
             return;
         }
-        let weight = self.lens_weight(1, &lens, area_jacobian, SolidAnglePdf(0.0), tracer);
+        let medium = match emission.end {
+            EmitterVertex::Infinite => scene.surroundings.camera,
+            _ => scene.medium_around(self.id),
+        };
+        let Some(flight) = segment_flight(scene, &segment, medium, tracer) else { return };
+        let raw = raw * flight.light;
+        let share = flight.transmittance.share();
+        let weight = self.lens_weight(1, &lens, area_jacobian, SolidAnglePdf(0.0), share, tracer);
         let [u0, u1, ..] = sampler.rng().next_4();
         self.splat(&LensConnection { s: 1, lens: &lens, segment, raw, weight, u: [u0, u1] }, tracer);
     }
@@ -117,23 +124,29 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
         if raw.is_black() {
             return;
         }
-        let area_jacobian = vertex.place.area_jacobian(lens.wi, lens.distance * lens.distance);
+        let segment = segment(&vertex.place.segment_end(), &SegmentEnd::Free(lens.p_near));
+        let (scene, medium) = (self.rules.scene, vertex.medium_towards(lens.wi));
+        let Some(flight) = segment_flight(scene, &segment, medium, tracer) else { return };
+        let raw = raw * flight.light;
+        let rate = flight.edge(None, Some(&vertex.place.stored())).rate;
+        let area_jacobian = vertex.place.area_jacobian(lens.wi, lens.distance * lens.distance) * rate;
         let directions = &self.rules.mis.directions;
         let pdf_rev = directions.pdf(p, &vertex.scatter, lens.wi, vertex.wo, Transport::Radiance);
-        let weight = self.lens_weight(s, &lens, area_jacobian, pdf_rev, tracer);
-        let segment = segment(&vertex.place.segment_end(), &SegmentEnd::Free(lens.p_near));
+        let share = flight.transmittance.share();
+        let weight = self.lens_weight(s, &lens, area_jacobian, pdf_rev, share, tracer);
         self.splat(&LensConnection { s, lens: &lens, segment, raw, weight, u: [u[2], u[3]] }, tracer);
     }
 
     /// Weight of the technique (s, 1) that connects y_{s−1} with `lens`: `area_jacobian` turns a density per steradian
     /// at the lens into one per unit area at y_{s−1}, from where a walk that came from the lens would go on to the
-    /// vertex before with the density `pdf_rev_prev`.
+    /// vertex before with the density `pdf_rev_prev`. `share` of the light passes the media between them.
     fn lens_weight(
         &self,
         s: usize,
         lens: &LensSample,
         area_jacobian: f32,
         pdf_rev_prev: SolidAnglePdf,
+        share: f32,
         tracer: &mut Tracer,
     ) -> MisWeight {
         let path = ConnectedPath {
@@ -142,7 +155,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
             eye: &[VertexPdfs::origin(lens.pdf)],
             eye_end: EndpointPdfs::NONE,
             emitter: self.out.emitter,
-            connection_factor: 1.0,
+            connection_factor: 1.0 / share,
             reverse: ReversePath {
                 vertices: &[ReverseTransport::default()],
                 edges: &[<S::Factor as ConnectionFactor>::Edge::default()],

@@ -8,6 +8,7 @@ use super::vertex::LightVertex;
 use crate::emit::{EmissionSample, EmitterVertex, LightId};
 use crate::math::sampler::PathSampler;
 use crate::math::{AreaPdf, Pmf, Rgb, Vec3};
+use crate::media::MediumNumber;
 use crate::mis::{
     ConnectionFactor, EmitterFactors, IncidentSubpath, MisContext, PathEnd, ResamplingTarget, SubpathPdfs,
     next_event_factor,
@@ -82,6 +83,9 @@ impl<S: ConnectionStrategy> LightSubpathTracer<'_, S> {
         let (lights, distribution) = (&self.scene.lights, &self.mis.emission);
         let Some((id, chosen)) = distribution.sample_light(lights, u[0]) else { return };
         let light = lights.get(id);
+        if self.scene.is_cut_off(light) {
+            return;
+        }
         let Some(emission) = distribution.sample_ray(lights, id, [u[1], u[2]], [v[0], v[1]]) else { return };
         out.pdfs.begin(emission.pdf_vertex() * chosen);
         out.emitter = EmitterFactors { can_be_hit: !light.is_delta(), next_event: 0.0 };
@@ -100,16 +104,17 @@ impl<S: ConnectionStrategy> LightSubpathTracer<'_, S> {
         // One edge of a path is left for the connection.
         let limits = PathLimits { max_edges: self.mis.light_limits.max_edges - 1, ..self.mis.light_limits };
         let rules = WalkRules { limits, mode: Transport::Importance, directions: &self.mis.directions };
-        walk(self.scene, start(&emission, throughput), &rules, tracer, sampler, &mut hooks);
+        let medium = self.scene.medium_around(id);
+        walk(self.scene, start(&emission, throughput, medium), &rules, tracer, sampler, &mut hooks);
     }
 }
 
 /// The walk that leaves a light.
-fn start(emission: &EmissionSample, throughput: Rgb) -> WalkStart {
+fn start(emission: &EmissionSample, throughput: Rgb, medium: MediumNumber) -> WalkStart {
     let &EmissionSample { origin, error, ng, direction, .. } = emission;
     let o = ng.map_or(origin, |ng| offset_point(origin, error, ng, direction));
     let ray = Ray { o, d: direction, t_min: T_MIN, t_max: f32::INFINITY };
-    WalkStart { ray, throughput, pdf: emission.pdf_direction, kind: RayKind::Light }
+    WalkStart { ray, throughput, pdf: emission.pdf_direction, kind: RayKind::Light, medium }
 }
 
 /// The hooks of a light sub-path.
@@ -139,7 +144,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
         let jacobian = place.area_jacobian(vertex.wo, distance2);
         // The light that the sub-path brings here is its throughput here times the density of having come here.
         let target_over_pdf = ResamplingTarget {
-            full: vertex.throughput.luminance() * pdf_fwd.0,
+            full: vertex.unattenuated.luminance() * pdf_fwd.0,
             first_stage: self.luminance_before * self.out.pdfs.cos_leaving().abs() * jacobian,
         };
         let mut light =

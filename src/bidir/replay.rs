@@ -37,6 +37,8 @@ pub enum SubpathKind {
 pub struct VertexRecord {
     /// The point with what its densities need.
     pub interior: Interior,
+    /// The shading normal, on a surface.
+    pub shading_normal: Option<Vec3>,
     /// Unit direction back along the walk.
     pub wo: Vec3,
     /// Length of the edge to the vertex before.
@@ -101,13 +103,17 @@ impl Replay {
 
     /// Writes down a vertex of a walk.
     pub fn vertex(&mut self, kind: SubpathKind, scene: &PreparedScene, v: &Vertex) {
-        let Place::Surface { point, .. } = v.place else { return };
         let record = VertexRecord {
             interior: Interior {
-                point: *point,
+                place: v.place.stored(),
+                media: v.media,
                 bsdf: v.scatter.bsdf().clone(),
                 light_choice_normal: light_choice_normal(scene, v),
                 delta: None,
+            },
+            shading_normal: match v.place {
+                Place::Surface { point, .. } => Some(point.frame.n),
+                Place::Medium(_) => None,
             },
             wo: v.wo,
             distance: v.edge.distance,

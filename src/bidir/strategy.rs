@@ -159,9 +159,9 @@ pub fn factor_of<S: ConnectionStrategy>(
     vertices: &AdjacentVertices,
 ) -> f32 {
     let AdjacentVertices { y, wo, z, wi, light } = vertices;
-    let mut lookup = strategy.look_up(&z.place(), -*wi);
-    strategy.see(&mut lookup, &y.place().segment_end(), &mut scene.tracer());
-    let edge = strategy.edge(&lookup, &y.place(), |to| y.bsdf.eval(*wo, to, Transport::Importance));
+    let mut lookup = strategy.look_up(&z.place, -*wi);
+    strategy.see(&mut lookup, &y.place.segment_end(), &mut scene.tracer());
+    let edge = strategy.edge(&lookup, &y.place, |to| y.bsdf.eval(*wo, to, Transport::Importance));
     mis.factor.c(light, &edge)
 }
 

@@ -75,6 +75,7 @@ static TABLES: LazyLock<Box<Tables>> = LazyLock::new(|| {
 #[derive(Clone, Debug)]
 pub struct PathSampler {
     tables: &'static Tables,
+    index: u32,
     /// The shuffled, reversed index.
     shuffled_rev: u32,
     scramble: u32,
@@ -96,6 +97,7 @@ impl PathSampler {
         let scramble = identity as u32;
         PathSampler {
             tables: &TABLES,
+            index,
             shuffled_rev: owen_scramble_rev(index.reverse_bits(), hash(scramble ^ 0x79c6_8e4a)),
             scramble: scramble.wrapping_mul(0x9c8f_2d3b),
             key: mix64(identity ^ u64::from(index)),
@@ -163,6 +165,18 @@ impl PathSampler {
     #[inline]
     pub fn vertex(&mut self, vertex: u32, slot: SampleSlot) -> [f32; 4] {
         self.set(vertex, slot as usize)
+    }
+
+    /// Two numbers for the edge to vertex `vertex`, which only some scenes need: each is stratified by itself over the
+    /// path's index, beside all other numbers of the path.
+    pub fn flight(&mut self, vertex: u32) -> [f32; 2] {
+        let key = mix64(u64::from(self.scramble) ^ (u64::from(vertex) << 32) ^ 0xf119_0000_0000_0000);
+        [key as u32, (key >> 32) as u32].map(|key| {
+            let shuffled_rev = owen_scramble_rev(self.index.reverse_bits(), hash(key));
+            // The radical inverse of the shuffled index.
+            let point_rev = shuffled_rev.reverse_bits();
+            u32_to_f32_norm(owen_scramble_rev(point_rev, hash(key ^ 0x9c8f_2d3b)).reverse_bits())
+        })
     }
 
     /// Unstratified numbers for whatever has no slot.

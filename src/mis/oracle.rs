@@ -6,7 +6,7 @@ use super::{Heuristic, MisContext};
 use crate::emit::EmitterVertex;
 use crate::math::measure::area_jacobian;
 use crate::math::{Rgb, Vec3};
-use crate::path::{DirectionSampler, FullPath, Interior};
+use crate::path::{DirectionSampler, FreeFlight, FullPath, Interior, segment_flight};
 use crate::prepared::PreparedScene;
 use crate::ray::Segment;
 use crate::ray::offset::{SegmentEnd, segment};
@@ -15,7 +15,8 @@ use crate::shade::Transport;
 /// Densities of the vertices v_0 … v_k of a path.
 #[derive(Clone, Debug)]
 pub struct PathPdfs {
-    /// p_L(v_i), from the light's end, survival of roulette included, for i < k, without the masks on the way.
+    /// p_L(v_i), from the light's end, survival of roulette included, for i < k, without the masks and media on the way,
+    /// but with κ of v_i.
     pub light: Vec<f64>,
     /// p_E(v_i), from the lens's end; as `light`.
     pub eye: Vec<f64>,
@@ -26,7 +27,7 @@ pub struct PathPdfs {
     pub next_event: f64,
     /// c_s of connections with s ≥ 2 and t ≥ 2, see `mis::factor`; 1 elsewhere.
     pub connection_factors: Vec<f64>,
-    /// τ of the edge v_{i−1} v_i, for i = 1 … k, and 1 for i = 0; 1 also where no light passes, since no technique makes
+    /// τ of masks times E of media of the edge v_{i−1} v_i, for i = 1 … k, and 1 for i = 0; 1 also where no light passes, since no technique makes
     /// such a path.
     pub transmittances: Vec<f64>,
 }
@@ -50,6 +51,19 @@ pub struct AdjacentVertices<'a> {
 /// The connection factor of two adjacent vertices, as the method knows it.
 pub type FactorOf<'a> = &'a dyn Fn(&AdjacentVertices) -> f32;
 
+/// The flight along an edge.
+#[derive(Clone, Copy, Debug)]
+struct EdgeFlight {
+    /// The probability to pass media and masks, from either end.
+    share: f64,
+    /// Flight through media.
+    free: FreeFlight,
+}
+
+impl EdgeFlight {
+    const NONE: EdgeFlight = EdgeFlight { share: 1.0, free: FreeFlight::NONE };
+}
+
 /// A path with the rules that its sub-paths follow.
 struct PathView<'a, F> {
     scene: &'a PreparedScene,
@@ -67,7 +81,7 @@ impl<F: ConnectionFactor> PathView<'_, F> {
                 EmitterVertex::Point { .. } => f64::from(distance).powi(-2),
                 EmitterVertex::Infinite => 1.0,
             },
-            _ => f64::from(area_jacobian(self.path.interior[i - 1].point.ng.dot(d), distance * distance)),
+            _ => f64::from(self.path.interior[i - 1].place.area_jacobian(d, distance * distance)),
         }
     }
 
@@ -81,14 +95,14 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         let survival = limits.survival(number as u32, &v.scatter());
         let pdf = match v.delta {
             Some((pdfs, _)) => pdfs[delta],
-            None => self.mis.directions.pdf(v.point.p, &v.bsdf, from, to, mode),
+            None => self.mis.directions.pdf(v.position(), &v.bsdf, from, to, mode),
         };
         f64::from(pdf.0) * f64::from(survival)
     }
 
     /// p_L(v_i), i = 0 … k − 1.
     fn light_pdfs(&self) -> Vec<f64> {
-        let path = self.path;
+        let (path, flights) = (self.path, self.flights());
         let (lights, emission, origin) = (&self.scene.lights, &self.mis.emission, &path.origin);
         let light = lights.get(origin.light);
         let chosen = f64::from(emission.pmf_light(lights, origin.light).0);
@@ -97,27 +111,28 @@ impl<F: ConnectionFactor> PathView<'_, F> {
             origin.light,
             origin.end.normal(),
             origin.direction,
-            path.interior.first().map_or(Vec3::ZERO, |v| v.point.p),
+            path.interior.first().map_or(Vec3::ZERO, |v| v.position()),
         );
         let (position, direction) = (f64::from(position.0), f64::from(direction.0));
         let infinite = light.is_infinite();
         let mut pdfs = vec![chosen * if infinite { direction } else { position }];
         for i in 1..path.edges() {
             pdfs.push(match i {
-                1 if infinite => position * f64::from(path.interior[0].point.ng.dot(path.origin.direction).abs()),
+                1 if infinite => position * f64::from(path.interior[0].place.cosine(path.origin.direction).abs()),
                 1 => direction * self.area_jacobian(1, 0),
                 _ => {
                     let (from, to) = (-path.edge(i - 2).0, path.edge(i - 1).0);
                     self.scatter_pdf(i - 1, from, to, Transport::Importance) * self.area_jacobian(i, i - 1)
                 }
             });
+            pdfs[i] *= f64::from(flights[i].free.rate);
         }
         pdfs
     }
 
     /// p_E(v_i), i = 0 … k.
     fn eye_pdfs(&self) -> Vec<f64> {
-        let (path, k) = (self.path, self.path.edges());
+        let (path, k, flights) = (self.path, self.path.edges(), self.flights());
         let (lens, direction) = self.scene.camera.pdf_sampled_ray(-path.edge(k - 1).0);
         let mut pdfs = vec![0.0; k + 1];
         pdfs[k] = f64::from(lens.0);
@@ -126,6 +141,7 @@ impl<F: ConnectionFactor> PathView<'_, F> {
             let (from, to) = (path.edge(i + 1).0, -path.edge(i).0);
             pdfs[i] = self.scatter_pdf(i + 1, from, to, Transport::Radiance) * self.area_jacobian(i, i);
         }
+        pdfs[..k].iter_mut().zip(&flights[1..]).for_each(|(pdf, flight)| *pdf *= f64::from(flight.free.rate_back));
         pdfs
     }
 
@@ -134,36 +150,40 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         let path = self.path;
         let light = self.scene.lights.get(path.origin.light);
         path.interior.first().map_or(1.0, |v| {
-            let chosen = self.scene.lights.pmf_light_from(v.point.p, v.light_choice_normal, path.origin.light);
+            let chosen = self.scene.lights.pmf_light_from(v.position(), v.light_choice_normal, path.origin.light);
             if light.is_delta() {
                 let emitted = self.mis.emission.pmf_light(&self.scene.lights, path.origin.light);
                 return f64::from(chosen.0) / f64::from(emitted.0);
             }
             let (d, distance) = path.edge(0);
-            let direct = f64::from(light.pdf_direct(v.point.p, path.origin.end.normal(), -d, distance).0);
+            let direct = f64::from(light.pdf_direct(v.position(), path.origin.end.normal(), -d, distance).0);
             f64::from(chosen.0) * direct * self.area_jacobian(0, 0) / origin
         })
     }
 
-    /// τ of every edge, by the number of the vertex at its end; see [`PathPdfs::transmittances`].
-    fn transmittances(&self) -> Vec<f64> {
+    /// The flight along every edge v_{i−1} v_i, as an edge to v_i, by the number i; none for i = 0, and where no light
+    /// passes, since no technique makes such a path.
+    fn flights(&self) -> Vec<EdgeFlight> {
         let (path, k, mut tracer) = (self.path, self.path.edges(), self.scene.tracer());
-        let end = |i: usize| match i {
-            0 => path.origin.end.segment_end(),
-            _ => Some(path.interior.get(i - 1).map_or(SegmentEnd::Free(path.lens), |v| v.place().segment_end())),
+        let mut flight = |i: usize| {
+            // From the vertex nearer to the lens, which is never at infinity.
+            let from = path.interior.get(i - 1);
+            let end = from.map_or(SegmentEnd::Free(path.lens), |v| v.place.segment_end());
+            let before = match i {
+                1 => path.origin.end.segment_end(),
+                _ => Some(path.interior[i - 2].place.segment_end()),
+            };
+            let (d, medium) = (-path.edge(i - 1).0, self.scene.surroundings.camera);
+            let edge = before.map_or_else(|| Segment::to_infinity(end.leaving(d), d), |before| segment(&end, &before));
+            let medium = from.map_or(medium, |v| v.medium_towards(d));
+            let flight = segment_flight(self.scene, &edge, medium, &mut tracer)?;
+            // The light's and the lens's end are on no medium.
+            let place = |i: usize| i.checked_sub(1).and_then(|i| path.interior.get(i)).map(|v| v.place);
+            let share = f64::from(flight.transmittance.share()) * f64::from(tracer.transmittance(&edge).share());
+            let free = flight.edge(place(i - 1).as_ref(), place(i).as_ref());
+            (share > 0.0).then_some(EdgeFlight { share, free })
         };
-        let edge = |i: usize| match (end(i), end(i - 1)) {
-            (Some(from), Some(to)) => Some(segment(&from, &to)),
-            (Some(from), None) => {
-                let d = -path.origin.direction;
-                Some(Segment::to_infinity(from.leaving(d), d))
-            }
-            _ => None,
-        };
-        let share = |edge: Segment| tracer.transmittance(&edge).share();
-        let shares = (1..=k).filter_map(edge).map(share);
-        let passing = |share: f32| if share > 0.0 { f64::from(share) } else { 1.0 };
-        std::iter::once(1.0).chain(shares.map(passing)).collect()
+        std::iter::once(EdgeFlight::NONE).chain((1..=k).map(|i| flight(i).unwrap_or(EdgeFlight::NONE))).collect()
     }
 
     /// c_s of every connection.
@@ -173,8 +193,13 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         if F::IS_ONE {
             return factors;
         }
+        let flights = self.flights();
+        let fly = |throughput: [f64; 3], edge: usize| {
+            let factor = flights[edge].free.throughput().to_array();
+            std::array::from_fn(|c| throughput[c] * f64::from(factor[c]))
+        };
         // β_L as a light sub-path has it on arriving at v_{i−1}.
-        let mut throughput = path.origin.throughput.to_array().map(f64::from);
+        let mut throughput: [f64; 3] = fly(path.origin.throughput.to_array().map(f64::from), 1);
         for (i, factor) in factors.iter_mut().enumerate().take(k).skip(2) {
             let v = &path.interior[i - 2];
             let (wo, wi) = (-path.edge(i - 2).0, path.edge(i - 1).0);
@@ -184,7 +209,7 @@ impl<F: ConnectionFactor> PathView<'_, F> {
             let luminance = |light: [f64; 3]| Rgb::from(light.map(|v| (v * jacobian) as f32)).luminance();
             let target_over_pdf = ResamplingTarget {
                 full: luminance(scattered),
-                first_stage: luminance(throughput) * v.point.ng.dot(wi).abs(),
+                first_stage: luminance(throughput) * v.place.cosine(wi).abs(),
             };
             let light = IncidentSubpath {
                 s: i,
@@ -193,7 +218,7 @@ impl<F: ConnectionFactor> PathView<'_, F> {
                 distance2: path.edge(i - 1).1.powi(2),
             };
             *factor = f64::from(factor_of(&AdjacentVertices { y: v, wo, z: &path.interior[i - 1], wi, light }));
-            throughput = scattered.map(|v| v / self.scatter_pdf(i - 1, wo, wi, Transport::Importance));
+            throughput = fly(scattered.map(|v| v / self.scatter_pdf(i - 1, wo, wi, Transport::Importance)), i);
         }
         factors
     }
@@ -218,7 +243,7 @@ impl PathPdfs {
             eye: view.eye_pdfs(),
             connectable: (0..=k).map(|i| if i == 0 { can_be_hit } else { smooth(i - 1) && smooth(i) }).collect(),
             connection_factors: view.connection_factors(factor_of),
-            transmittances: view.transmittances(),
+            transmittances: view.flights().iter().map(|flight| flight.share).collect(),
         }
     }
 

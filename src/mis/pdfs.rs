@@ -9,6 +9,10 @@
 //! part of the ratio, and are left out of p_fwd as well: among the techniques of a path they tell only the one that
 //! connects the vertex with the vertex before from the others, which walk ([`VertexPdfs::connection_factor`]).
 //!
+//! In media the density of a vertex is per unit of volume. Light collides on its way with the density E κ per unit of
+//! length (see [`media`](crate::media)): E is treated as the holes of masks are, and κ of a vertex, which differs from one
+//! end of an edge to the other, is part of p_fwd and of [`VertexPdfs::area_jacobian`].
+//!
 //! Densities of a vertex at infinity are per steradian of its direction; the disk that emission rays start on stands in
 //! for the direction's density at the next vertex (see `emit::sample`). [`VertexPdfs::area_jacobian`] hides the
 //! difference.
@@ -16,7 +20,7 @@
 use super::factor::ConnectionFactor;
 use crate::math::measure::area_jacobian;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
-use crate::path::{DirectionSampler, Edge, Vertex};
+use crate::path::{DirectionSampler, Edge, FreeFlight, Vertex};
 use crate::ray::Transmittance;
 use crate::shade::{BsdfSample, Transport};
 
@@ -28,7 +32,7 @@ pub struct VertexPdfs {
     pub pdf_fwd: AreaPdf,
     /// Turns a density per steradian at this vertex, of directions towards the vertex before, into an area density of
     /// the vertex before:
-    /// |cos| there / d²; 1 if that vertex is at infinity. Of a vertex that is itself at infinity: |cos| there, for the density
+    /// |cos| κ there / d²; 1 if that vertex is at infinity. Of a vertex that is itself at infinity: |cos| there, for the density
     /// per unit area of the emission disk.
     pub area_jacobian: f32,
     /// Survival of roulette at this vertex, where the walk from the other end plays it.
@@ -40,7 +44,7 @@ pub struct VertexPdfs {
     /// connections. Valid once the walk has left it.
     pub connectable: bool,
     /// Factor of the technique that connects this vertex with the vertex before: 1/τ of the edge (see
-    /// `ray::transmittance`), in light sub-paths times c of the connection (see [`ConnectionFactor`]).
+    /// `ray::transmittance`), media included, in light sub-paths times c of the connection (see [`ConnectionFactor`]).
     pub connection_factor: f32,
     /// Partial sums of effective densities: the techniques that use no vertices of this sub-path but those before this
     /// one (see [`MisContext::accumulate_partial_sums`](super::MisContext::accumulate_partial_sums)). Valid once the
@@ -84,7 +88,7 @@ impl SubpathPdfs {
     }
 
     /// The walk arrived at `vertex` from a vertex that is not a light's; `survival` is the survival there of a walk
-    /// from the other end. Returns p_fwd.
+    /// from the other end. Returns p_fwd without κ of media.
     #[inline]
     pub fn arrive(&mut self, vertex: &Vertex, survival: f32) -> AreaPdf {
         let (edge, cos) = (vertex.edge, vertex.place.cosine(vertex.wo));
@@ -100,9 +104,11 @@ impl SubpathPdfs {
         self.arrive_with(edge, AreaPdf(edge.pdf_with_survival().0), self.cos_leaving.abs(), 1.0);
     }
 
-    /// The walk arrived at its next vertex by `edge`, with densities that its emitter knows.
+    /// The walk arrived at its next vertex by `edge`, with densities that its emitter knows, κ of media apart.
     #[inline]
     pub fn arrive_with(&mut self, edge: &Edge, pdf_fwd: AreaPdf, area_jacobian: f32, survival: f32) {
+        let FreeFlight { rate, rate_back, .. } = edge.flight;
+        let (pdf_fwd, area_jacobian) = (AreaPdf(pdf_fwd.0 * rate), area_jacobian * rate_back);
         self.vertices.push(VertexPdfs::new(edge.transmittance, pdf_fwd, area_jacobian, survival));
     }
 
@@ -177,6 +183,8 @@ pub struct ReverseTransport {
     pub value: Rgb,
     /// Density per steradian with which a walk from the light would go on from here to the vertex before.
     pub pdf: f32,
+    /// Flight along the edge to here.
+    pub flight: FreeFlight,
 }
 
 /// Densities of an eye sub-path, with what factors of connections along it ask for.
@@ -202,13 +210,13 @@ impl<F: ConnectionFactor> EyeSubpathPdfs<F> {
         self.pdfs.begin(lens);
         self.reverse.clear();
         self.edges.clear();
-        self.push(0.0, 0.0);
+        self.push(0.0, 0.0, FreeFlight::NONE);
     }
 
     #[inline]
-    fn push(&mut self, cos: f32, distance2: f32) {
+    fn push(&mut self, cos: f32, distance2: f32, flight: FreeFlight) {
         if !F::IS_ONE {
-            self.reverse.push(ReverseTransport { cos, distance2, ..ReverseTransport::default() });
+            self.reverse.push(ReverseTransport { cos, distance2, flight, ..ReverseTransport::default() });
             self.edges.push(F::Edge::default());
         }
     }
@@ -217,7 +225,8 @@ impl<F: ConnectionFactor> EyeSubpathPdfs<F> {
     #[inline]
     pub fn arrive(&mut self, vertex: &Vertex, survival: f32) {
         self.pdfs.arrive(vertex, survival);
-        self.push(vertex.place.cosine(vertex.wo).abs(), vertex.edge.distance * vertex.edge.distance);
+        let edge = vertex.edge;
+        self.push(vertex.place.cosine(vertex.wo).abs(), edge.distance * edge.distance, edge.flight);
     }
 
     /// Takes back the last arrival.
@@ -230,7 +239,7 @@ impl<F: ConnectionFactor> EyeSubpathPdfs<F> {
     /// The walk left the scene; see [`SubpathPdfs::arrive_at_infinity`].
     pub fn arrive_at_infinity(&mut self, edge: &Edge) {
         self.pdfs.arrive_at_infinity(edge);
-        self.push(0.0, 0.0);
+        self.push(0.0, 0.0, edge.flight);
     }
 
     /// Notes at the last vertex the value and density of light on its way back, and what the factor of the edge to the

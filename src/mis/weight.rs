@@ -87,7 +87,8 @@ pub struct ConnectedPath<'a, F: ConnectionFactor> {
     pub eye_end: EndpointPdfs,
     /// c_0 and c_1.
     pub emitter: EmitterFactors,
-    /// c of this connection, if s ≥ 2 and t ≥ 2, else 1; over the transmittance of its edge, where that is known.
+    /// c of this connection, if s ≥ 2 and t ≥ 2, else 1; over the transmittance of its edge, where that is known (in
+    /// scenes with media).
     pub connection_factor: f32,
     /// Arguments of the factors of connections along the eye sub-path.
     pub reverse: ReversePath<'a, F>,
@@ -299,11 +300,14 @@ impl<F: ConnectionFactor> MisContext<F> {
             false => (reverse.value, reverse.pdf),
         };
         let (scattered, arriving) = (*throughput * value, *throughput);
+        // Targets of resampling know nothing of media.
+        let area_jacobian = vertex.area_jacobian / reverse.flight.rate_back;
         let target_over_pdf = ResamplingTarget {
-            full: scattered.luminance() * vertex.area_jacobian,
-            first_stage: arriving.luminance() * reverse.cos * vertex.area_jacobian,
+            full: scattered.luminance() * area_jacobian,
+            first_stage: arriving.luminance() * reverse.cos * area_jacobian,
         };
-        *throughput = scattered * (1.0 / (pdf * self.survival(vertex, t - 1 - n + s)));
+        let flight = reverse.flight.throughput_back();
+        *throughput = scattered * flight * (1.0 / (pdf * self.survival(vertex, t - 1 - n + s)));
         if n < 2 {
             return 1.0;
         }

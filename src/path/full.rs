@@ -5,14 +5,17 @@
 use super::vertex::{Scatter, StoredPlace};
 use crate::emit::{EmitterVertex, LightId};
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
-use crate::shade::{Bsdf, SurfacePoint};
+use crate::media::MediumNumber;
+use crate::shade::Bsdf;
 
 /// A vertex between the two ends.
 #[derive(Clone, Debug)]
 pub struct Interior {
-    /// The point.
-    pub point: SurfacePoint,
-    /// The BSDF there, resolved for either of the two directions of the path.
+    /// The place.
+    pub place: StoredPlace,
+    /// The media on the side of the geometric normal and on the other one.
+    pub media: [MediumNumber; 2],
+    /// The scattering function there, resolved for either of the two directions of the path.
     pub bsdf: Bsdf,
     /// The normal that the choice of a light may use here.
     pub light_choice_normal: Option<Vec3>,
@@ -27,9 +30,14 @@ impl Interior {
         Scatter(&self.bsdf)
     }
 
-    /// The place.
-    pub fn place(&self) -> StoredPlace {
-        StoredPlace::Surface { p: self.point.p, error: self.point.error, ng: self.point.ng }
+    /// Position.
+    pub fn position(&self) -> Vec3 {
+        self.place.position()
+    }
+
+    /// The medium in the direction `d`.
+    pub fn medium_towards(&self, d: Vec3) -> MediumNumber {
+        self.media[usize::from(self.place.cosine(d) < 0.0)]
     }
 }
 
@@ -72,7 +80,7 @@ impl FullPath {
                 EmitterVertex::Infinite => None,
             }
         } else {
-            Some(self.interior.get(i - 1).map_or(self.lens, |v| v.point.p))
+            Some(self.interior.get(i - 1).map_or(self.lens, |v| v.position()))
         }
     }
 

@@ -3,6 +3,7 @@
 //! Integrators never write a bounce loop: they give [`walk()`] an origin and hooks.
 
 pub mod directions;
+pub mod flight;
 pub mod full;
 pub mod iteration;
 pub mod passage;
@@ -13,6 +14,7 @@ pub mod visibility;
 pub mod walk;
 
 pub use directions::{DirectionSampler, ScatterSampler};
+pub use flight::{FreeFlight, SegmentFlight, segment_flight};
 pub use full::{FullPath, Interior, Origin};
 pub use iteration::Iteration;
 pub use passage::first_seen;

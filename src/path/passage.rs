@@ -8,6 +8,7 @@ use super::vertex::{Edge, Place, Scatter, Vertex};
 use super::walk::WalkHooks;
 use crate::math::Rgb;
 use crate::math::hash::HashRng;
+use crate::media::MediumNumber;
 use crate::prepared::PreparedScene;
 use crate::ray::transmittance::{MAX_CROSSINGS, beyond};
 use crate::ray::{Hit, MaskPoint, Ray, RayKind, Tracer};
@@ -81,7 +82,19 @@ impl<'s> Passage<'s, '_> {
         let bsdf = Bsdf::empty(self.point);
         let place = Place::Surface { point: self.point, hit: &self.hit };
         let scatter = Scatter(&bsdf);
-        hooks.passing(&Vertex { index, place, scatter, wo: -self.ray.d, throughput, edge: self.edge });
+        // The path ends there: media beside the surface do not matter.
+        let media = [MediumNumber::VACUUM; 2];
+        let wo = -self.ray.d;
+        hooks.passing(&Vertex {
+            index,
+            place,
+            scatter,
+            wo,
+            throughput,
+            unattenuated: throughput,
+            media,
+            edge: self.edge,
+        });
     }
 }
 

@@ -1,8 +1,9 @@
 //! A vertex of a sub-path: a place, and a function that scatters light there.
 
+use super::flight::FreeFlight;
 use crate::math::measure::area_jacobian;
 use crate::math::{Rgb, SolidAnglePdf, Vec3};
-use crate::media::MediumPoint;
+use crate::media::{MediumNumber, MediumPoint, collision_rate};
 use crate::ray::offset::SegmentEnd;
 use crate::ray::{Hit, Transmittance};
 use crate::shade::{Bsdf, BsdfSample, BsdfView, SurfacePoint, Transport};
@@ -20,9 +21,11 @@ pub struct Edge {
     pub survival: f32,
     /// Length.
     pub distance: f32,
-    /// τ: the share of light that passes the masks on the edge, which is the probability with which the walk has passed
-    /// them.
+    /// τ: the probability with which the walk has passed the masks and media on the edge. It is the same from the other
+    /// end.
     pub transmittance: Transmittance,
+    /// Flight through media.
+    pub flight: FreeFlight,
 }
 
 impl Edge {
@@ -31,10 +34,11 @@ impl Edge {
     #[inline]
     pub fn new(from: Vec3, pdf: SolidAnglePdf) -> Edge {
         let (distance, transmittance) = (f32::INFINITY, Transmittance::ONE);
-        Edge { from, pdf, delta: false, survival: 1.0, distance, transmittance }
+        Edge { from, pdf, delta: false, survival: 1.0, distance, transmittance, flight: FreeFlight::NONE }
     }
 
-    /// Density per steradian of the direction, survival of Russian roulette included, without the masks on the way.
+    /// Density per steradian of the direction, survival of Russian roulette included, without the masks and media on the
+    /// way.
     #[inline]
     pub fn pdf_with_survival(&self) -> SolidAnglePdf {
         SolidAnglePdf(self.pdf.0 * self.survival)
@@ -92,11 +96,21 @@ impl StoredPlace {
     }
 
     /// Turns a density per steradian at a point a distance √`distance2` away in the unit direction `d` into the density
-    /// per unit area (in a medium: volume) of this place: |cos| / d² on a surface, 1 / d² in a medium (Veach 1997, eq.
-    /// 8.8).
+    /// per unit area (in a medium: volume, κ apart) of this place: |cos| / d² on a surface, 1 / d² in a medium (Veach
+    /// 1997, eq. 8.8).
     #[inline]
     pub fn area_jacobian(&self, d: Vec3, distance2: f32) -> f32 {
         area_jacobian(self.cosine(d), distance2)
+    }
+
+    /// κ of this end of a segment through media that let `passing` of the light through (see
+    /// [`media`](crate::media)): 1 on a surface.
+    #[inline]
+    pub fn collision_rate(&self, passing: Rgb) -> f32 {
+        match self {
+            StoredPlace::Surface { .. } => 1.0,
+            StoredPlace::Medium(medium) => collision_rate(medium.sigma_t, passing),
+        }
     }
 
     /// The geometric normal on the side of the direction `d`; zero in a medium.
@@ -157,6 +171,15 @@ impl Place<'_> {
         match self {
             Place::Surface { point, .. } => point.ng,
             Place::Medium(_) => Vec3::ZERO,
+        }
+    }
+
+    /// σ_t in a medium; `None` on a surface.
+    #[inline]
+    pub fn extinction(&self) -> Option<Rgb> {
+        match self {
+            Place::Surface { .. } => None,
+            Place::Medium(medium) => Some(medium.sigma_t),
         }
     }
 
@@ -287,6 +310,10 @@ pub struct Vertex<'a> {
     /// Throughput up to this vertex: all factors of the measurement contribution that the walk has passed, divided by
     /// its density.
     pub throughput: Rgb,
+    /// The throughput before the flight of the last edge.
+    pub unattenuated: Rgb,
+    /// The media on the side of the geometric normal and on the other one.
+    pub media: [MediumNumber; 2],
     /// How it was reached.
     pub edge: &'a Edge,
 }
@@ -296,6 +323,12 @@ impl Vertex<'_> {
     #[inline]
     pub fn position(&self) -> Vec3 {
         self.place.position()
+    }
+
+    /// The medium in the direction `d`.
+    #[inline]
+    pub fn medium_towards(&self, d: Vec3) -> MediumNumber {
+        self.media[usize::from(self.place.cosine(d) < 0.0)]
     }
 
     /// The normal that the choice of a light may use here: the shading normal on the side of `wo`, none where light

@@ -1,18 +1,21 @@
 //! The random walk: the only bounce loop of the program.
 //!
-//! From an origin it traces, goes straight on through the holes of masks (`passage`), resolves the vertex, shows it to
+//! From an origin it traces, goes straight on through the holes of masks (`passage`) and through media until light
+//! collides (`flight`), resolves the vertex, shows it to
 //! the hooks, draws the next direction from the direction sampler and plays Russian roulette, until a limit, a miss or a
 //! hook ends it. [`Transport`] says whether it carries radiance or importance.
 
 use super::directions::DirectionSampler;
+use super::flight::{Arrival, FlyingEdge};
 use super::iteration::Iteration;
 use super::passage::Passage;
 use super::roulette::PathLimits;
 use super::vertex::{Edge, Place, Scatter, Vertex};
 use crate::math::sampler::{PathSampler, SampleSlot};
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf, Vec3};
+use crate::media::MediumNumber;
 use crate::prepared::{Features, PreparedScene};
-use crate::ray::{Ray, RayKind, T_MIN, Tracer, offset::offset_point};
+use crate::ray::{Ray, RayKind, T_MIN, Tracer};
 use crate::shade::{Bsdf, BsdfSample, SurfacePoint, Transport};
 
 /// Where a walk begins.
@@ -26,6 +29,8 @@ pub struct WalkStart {
     pub pdf: SolidAnglePdf,
     /// Statistics count the first ray as this kind.
     pub kind: RayKind,
+    /// The medium that it begins in.
+    pub medium: MediumNumber,
 }
 
 /// The start of a walk from the lens.
@@ -61,7 +66,7 @@ impl WalkStart {
         let eye = scene.camera.sample_ray(raster, u);
         let (lens_pdf, pdf) = scene.camera.pdf_sampled_ray(eye.direction);
         let ray = Ray { o: eye.origin, d: eye.direction, t_min: eye.t_near, t_max: eye.t_far };
-        CameraStart { walk: WalkStart { ray, throughput, pdf, kind }, lens_pdf }
+        CameraStart { walk: WalkStart { ray, throughput, pdf, kind, medium: scene.surroundings.camera }, lens_pdf }
     }
 }
 
@@ -105,40 +110,70 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
     sampler: &mut PathSampler,
     hooks: &mut H,
 ) {
-    let WalkStart { ray, mut throughput, pdf, mut kind } = start;
+    let WalkStart { ray, mut throughput, pdf, mut kind, mut medium } = start;
     let WalkRules { limits, mode, directions } = *rules;
     let Ray { mut o, mut d, mut t_min, mut t_max } = ray;
     let mut edge = Edge::new(o, pdf);
-    let has_masks = scene.features.contains(Features::MASKS);
+    let (has_masks, has_media) = (scene.features.contains(Features::MASKS), !scene.media.is_empty());
+    let mut extinction_back = None;
     let mut point = SurfacePoint::default();
     let mut bsdf = Bsdf::empty(&point);
     for index in 1..=limits.max_edges {
         let ray = Ray { o, d, t_min, t_max };
-        let Some(mut hit) = tracer.closest(&ray, kind) else {
-            hooks.escaped(index, d, throughput, &edge);
-            return;
+        let (wo, unattenuated) = (-d, throughput);
+        let arrival = if has_media {
+            let (edge, point) = (&mut edge, &mut point);
+            let mut flying = FlyingEdge { scene, ray, medium, edge, point, extinction_back, throughput, index };
+            let arrival = flying.fly(kind, tracer, sampler, hooks);
+            medium = flying.medium;
+            throughput *= edge.flight.throughput();
+            arrival
+        } else {
+            match tracer.closest(&ray, kind) {
+                None => Arrival::Escaped,
+                Some(hit) => {
+                    edge.distance = hit.t;
+                    let material = scene.surface_point_into(&hit, &mut point);
+                    if has_masks {
+                        let mut passage = Passage { scene, ray, edge: &mut edge, hit, point: &mut point };
+                        let passed = |passage: &Passage| passage.show_emission(index, throughput, hooks);
+                        match passage.go_on(material, kind, tracer, sampler.rng(), passed) {
+                            None => Arrival::Escaped,
+                            Some((hit, material)) => Arrival::Surface(hit, material),
+                        }
+                    } else {
+                        Arrival::Surface(hit, material)
+                    }
+                }
+            }
         };
-        edge.distance = hit.t;
-        let wo = -d;
-        let mut material = scene.surface_point_into(&hit, &mut point);
-        if has_masks {
-            let mut passage = Passage { scene, ray, edge: &mut edge, hit, point: &mut point };
-            let passed = |passage: &Passage| passage.show_emission(index, throughput, hooks);
-            let Some(met) = passage.go_on(material, kind, tracer, sampler.rng(), passed) else {
+        let (hit, medium_point);
+        let (place, media) = match arrival {
+            Arrival::Escaped => {
                 hooks.escaped(index, d, throughput, &edge);
                 return;
-            };
-            (hit, material) = met;
-        }
-        material.resolve_into(&mut bsdf, &point, wo);
-        let place = Place::Surface { point: &point, hit: &hit };
-        let vertex = Vertex { index, place, scatter: Scatter(&bsdf), wo, throughput, edge: &edge };
+            }
+            Arrival::Surface(met, material) => {
+                hit = met;
+                material.resolve_into(&mut bsdf, &point, wo);
+                let media = if has_media { scene.media_beside(&hit, medium) } else { [MediumNumber::VACUUM; 2] };
+                (Place::Surface { point: &point, hit: &hit }, media)
+            }
+            Arrival::Collided(met) => {
+                medium_point = met;
+                bsdf.set_phase(scene.medium_scattering(&medium_point));
+                (Place::Medium(&medium_point), [medium; 2])
+            }
+        };
+        let scatter = Scatter(&bsdf);
+        let vertex = Vertex { index, place, scatter, wo, throughput, unattenuated, media, edge: &edge };
         if !hooks.vertex(&vertex, tracer, sampler) || index == limits.max_edges {
             return;
         }
 
         let u = sampler.vertex(index, SampleSlot::Scatter);
-        let Some(sample) = directions.sample(point.p, &vertex.scatter, wo, [u[0], u[1], u[2]], mode) else { return };
+        let p = vertex.position();
+        let Some(sample) = directions.sample(p, &vertex.scatter, wo, [u[0], u[1], u[2]], mode) else { return };
         let survival = limits.survival(index, &vertex.scatter);
         if u[3] >= survival {
             return;
@@ -148,8 +183,13 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
             return;
         }
         hooks.leaving(&vertex, &sample);
-        edge = Edge { delta: sample.delta, survival, ..Edge::new(point.p, sample.pdf) };
-        (o, d) = (offset_point(point.p, point.error, point.ng, sample.wi), sample.wi);
+        if has_media {
+            medium = vertex.medium_towards(sample.wi);
+        }
+        let end = vertex.place.segment_end();
+        extinction_back = vertex.place.extinction();
+        edge = Edge { delta: sample.delta, survival, ..Edge::new(p, sample.pdf) };
+        (o, d) = (end.leaving(sample.wi), sample.wi);
         (t_min, t_max) = (T_MIN, f32::INFINITY);
         kind = match mode {
             Transport::Radiance => RayKind::Bounce,

@@ -3,6 +3,7 @@
 use super::coplanar::raise_emitters;
 use super::lights::{Extent, all_lights};
 use super::limits::{MAX_REACH, check_instances};
+use super::media::{Surroundings, build_media};
 use super::placing::{PlacedScene, bounds};
 use super::units::to_usual_size;
 use super::{Features, MeshShading, PreparedScene, TriangleTable};
@@ -91,16 +92,20 @@ impl PreparedScene {
         let mut features =
             features(&desc, &sensor, &materials, &lights, &meshes, window != [0, 0, film_size[0], film_size[1]]);
         features.set(Features::MASKS, geometry.has_any_of(SurfaceMask::MASKS));
+        let media = build_media(&desc.media);
+        features.set(Features::MEDIA, !media.is_empty());
         let geometry = Arc::new(geometry);
         let start = Instant::now();
         let query = options.backend.build(geometry.clone(), options.threads)?;
-        Ok(PreparedScene {
+        let mut scene = PreparedScene {
             query,
             triangles: TriangleTable::new(&geometry, &meshes),
             geometry,
             meshes,
             instance_normals,
             materials,
+            media,
+            surroundings: Surroundings::default(),
             lights,
             camera,
             filter: PixelFilter::new(sensor.film.filter),
@@ -111,7 +116,9 @@ impl PreparedScene {
             radius,
             features,
             tree_seconds: start.elapsed().as_secs_f64(),
-        })
+        };
+        scene.surroundings = scene.find_surroundings(sensor.medium);
+        Ok(scene)
     }
 }
 

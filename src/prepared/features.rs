@@ -36,6 +36,8 @@ features! {
     AREA_LIGHTS = 9, "area-lights";
     /// Some material scatters into lobes so narrow that connections hardly ever meet them.
     NEARLY_SPECULAR = 10, "nearly-specular";
+    /// Light is scattered or absorbed between surfaces.
+    MEDIA = 11, "media";
 }
 
 impl Features {

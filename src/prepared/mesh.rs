@@ -1,5 +1,6 @@
 //! Data of surfaces for shading: the material and, of meshes, per-vertex data and its interpolation.
 
+use super::media::SurfaceInterface;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::BsdfId;
 use crate::shade::SurfacePoint;
@@ -17,6 +18,8 @@ pub struct MeshShading {
     pub material: Option<BsdfId>,
     /// Number of the light that is the first triangle, if a mesh emits; the others follow. A round shape is one light.
     pub first_light: Option<u32>,
+    /// The media on its sides, if the surface separates media.
+    pub interface: Option<SurfaceInterface>,
     /// The material depends on the direction of dp/du.
     pub wants_tangents: bool,
     /// The material or the emission looks something up by texture coordinates.

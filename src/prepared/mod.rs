@@ -11,6 +11,7 @@ pub mod features;
 mod flat_edges;
 mod lights;
 mod limits;
+pub mod media;
 pub mod mesh;
 mod placing;
 pub mod triangles;
@@ -18,11 +19,13 @@ mod units;
 
 pub use build::{PrepareError, PrepareOptions};
 pub use features::Features;
+pub use media::{SurfaceInterface, Surroundings};
 pub use mesh::MeshShading;
 pub use triangles::TriangleTable;
 
 use crate::emit::{Camera, LightId, LightSet, PixelFilter};
 use crate::math::{DVec3, Frame, Rgb, Vec2, Vec3};
+use crate::media::MediumSet;
 use crate::ray::round::RoundUv;
 use crate::ray::{Geometry, Hit, MaskLookup, MaskPoint, NONE, RayQuery, RoundPoint, Tracer};
 use crate::shade::{Material, MaterialSet, SurfacePoint};
@@ -43,6 +46,10 @@ pub struct PreparedScene {
     pub instance_normals: Vec<Mat3A>,
     /// Materials.
     pub materials: MaterialSet,
+    /// Participating media.
+    pub media: MediumSet,
+    /// The media around camera and lights.
+    pub surroundings: Surroundings,
     /// Lights.
     pub lights: LightSet,
     /// Camera.
@@ -157,8 +164,9 @@ impl PreparedScene {
     /// A tracer of rays through the scene, with empty counters.
     #[inline]
     pub fn tracer(&self) -> Tracer<'_> {
-        let has_masks = self.features.contains(Features::MASKS);
-        Tracer::new(&*self.query, has_masks.then_some(self))
+        // With media, the light that passes a segment is known before its ray is traced (`path::flight`).
+        let asks_masks = self.features.contains(Features::MASKS) && self.media.is_empty();
+        Tracer::new(&*self.query, asks_masks.then_some(self))
     }
 
     /// The light that the surface hit belongs to.

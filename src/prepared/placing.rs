@@ -2,6 +2,7 @@
 //! shading need.
 
 use super::MeshShading;
+use super::media::SurfaceInterface;
 use crate::math::{DVec3, Vec3};
 use crate::ray::{Geometry, Instance, MeshBuffers, RoundShape, SurfaceMask, VertexBuffer};
 use crate::scene::{
@@ -137,6 +138,7 @@ struct Part {
     to_place: DMat4,
     flip: bool,
     material: Option<BsdfId>,
+    interface: Option<SurfaceInterface>,
     wants: Wants,
 }
 
@@ -155,9 +157,9 @@ impl Wants {
         Wants {
             surface: match (wants.passes_through, wants.scatters || shape.emission.is_some()) {
                 (false, _) => SurfaceMask::BLOCKERS,
-                (true, false) => SurfaceMask::INTERFACES,
-                // Walks must meet emission.
-                (true, true) => SurfaceMask::MASKS,
+                (true, false) if shape.interface.is_none() => SurfaceMask::INTERFACES,
+                // Walks must meet emission, and the borders of media.
+                (true, _) => SurfaceMask::MASKS,
             },
             tangents: wants.oriented,
             uvs: wants.textured || wants.oriented || emission_textured,
@@ -235,6 +237,7 @@ impl<'a> Placer<'a> {
         self.round.push(RoundShape::new(kind, to_place, shape.flip_normals, wants.surface));
         self.round_shading.push(MeshShading {
             material: shape.bsdf,
+            interface: shape.interface.as_ref().map(SurfaceInterface::new),
             wants_tangents: wants.tangents,
             wants_uvs: wants.uvs,
             ..MeshShading::default()
@@ -252,7 +255,8 @@ impl<'a> Placer<'a> {
             None => MeshDesc::default(),
         };
         let wants = Wants::new(shape, self.materials);
-        self.parts.push(Part { mesh, to_place, flip: shape.flip_normals, material: shape.bsdf, wants });
+        let interface = shape.interface.as_ref().map(SurfaceInterface::new);
+        self.parts.push(Part { mesh, to_place, flip: shape.flip_normals, material: shape.bsdf, interface, wants });
     }
 }
 
@@ -271,7 +275,7 @@ fn finish(parts: Vec<Part>) -> (Vec<PlacedMesh>, Vec<(String, usize)>) {
 /// Moves a mesh to its place, drops triangles without area, and turns triangles so that their winding agrees with the
 /// vertex normals (the side of a surface is the side of its geometric normal everywhere after this).
 fn place(part: Part) -> (PlacedMesh, usize) {
-    let Part { mut mesh, to_place, flip, material, wants } = part;
+    let Part { mut mesh, to_place, flip, material, interface, wants } = part;
     if to_place != DMat4::IDENTITY {
         mesh.positions.par_iter_mut().for_each(|p| *p = to_place.transform_point3(p.as_dvec3()).as_vec3());
         let normal_map = DMat3::from_mat4(to_place).inverse().transpose();
@@ -319,6 +323,7 @@ fn place(part: Part) -> (PlacedMesh, usize) {
         colors: if wants.colors { mesh.colors } else { vec![] },
         material,
         first_light: None,
+        interface,
         wants_tangents: wants.tangents,
         wants_uvs: wants.uvs,
     };

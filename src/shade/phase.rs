@@ -119,6 +119,13 @@ impl Phase {
 }
 
 impl PhaseScattering {
+    /// Nothing is scattered.
+    pub const NONE: PhaseScattering = PhaseScattering {
+        sigma_s: Rgb::BLACK,
+        albedo: 0.0,
+        phase: Phase { lobes: [PhaseLobe::Isotropic; 2], second: 0.0 },
+    };
+
     /// σ_s p and p.
     #[inline]
     pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, SolidAnglePdf) {

@@ -58,11 +58,11 @@ fn context(scene: &PreparedScene, techniques: &str, heuristic: Heuristic, rr_dep
 /// How far the rounding of positions, from which the definition computes directions and cosines anew, changes these: it
 /// counts on short edges and at grazing angles.
 fn rounding(path: &FullPath) -> f64 {
-    let normal = |k: usize| path.interior.get(k.wrapping_sub(1)).map(|v| v.point.ng);
+    let place = |k: usize| path.interior.get(k.wrapping_sub(1)).map(|v| v.place);
     let edge = |k: usize| {
         let (a, b) = (path.position(k)?, path.position(k + 1)?);
         let (length, d) = ((b - a).length(), (b - a).normalize());
-        let cos = [k, k + 1].into_iter().filter_map(normal).map(|n| n.dot(d).abs()).fold(1.0, f32::min);
+        let cos = [k, k + 1].into_iter().filter_map(place).map(|place| place.cosine(d).abs()).fold(1.0, f32::min);
         Some(f64::from(f32::EPSILON * (a.length() + b.length()) / (length * cos)))
     };
     (0..path.edges()).filter_map(edge).sum()

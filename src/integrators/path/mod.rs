@@ -20,8 +20,8 @@ use crate::math::sampler::PathSampler;
 use crate::math::{Pmf, Rgb, SolidAnglePdf, Vec3};
 use crate::mis::Heuristic;
 use crate::path::{
-    Edge, PathLimits, ScatterSampler, ShadowQueue, Vertex, WalkHooks, WalkRules, WalkStart, direct_segment, streams,
-    walk,
+    Edge, PathLimits, ScatterSampler, SegmentFlight, ShadowQueue, Vertex, WalkHooks, WalkRules, WalkStart,
+    direct_segment, segment_flight, streams, walk,
 };
 use crate::prepared::{Features, PreparedScene};
 use crate::ray::{Phases, RayKind, RayStats, Tracer, Transmittance};
@@ -201,6 +201,13 @@ impl QueuedLight {
         QueuedLight { raw: self.raw * transmittance, weight, ..self }
     }
 
+    /// The light that passes the media on the segment, and the masks beside them.
+    #[inline]
+    fn along(self, flight: &SegmentFlight, heuristic: Heuristic) -> QueuedLight {
+        let weight = heuristic.weight_through(self.weight, flight.transmittance);
+        QueuedLight { raw: self.raw * flight.light, weight, ..self }
+    }
+
     /// Nothing blocked the ray.
     #[inline]
     fn arrive(self, samples: &mut SampleBuffer, replay: Option<&mut Replay>) {
@@ -287,8 +294,12 @@ impl<'a> Gather<'a> {
             return;
         }
         let segment = direct_segment(&vertex.place.segment_end(), sample);
+        let Some(flight) = segment_flight(self.scene, &segment, vertex.medium_towards(sample.wi), tracer) else {
+            return;
+        };
         let replay_index = self.record((1, vertex.index as usize + 1), direct.raw, weight, false);
         let queued = QueuedLight { pixel: self.pixel, replay_index, raw: direct.raw, weight };
+        let queued = queued.along(&flight, self.rules.heuristic);
         let (samples, replay, heuristic) = (&mut *self.samples, &mut self.replay, self.rules.heuristic);
         self.queue.push(&segment, queued, tracer, |light, transmittance| {
             light.through(transmittance, heuristic).arrive(samples, replay.as_deref_mut());
