@@ -89,7 +89,7 @@ impl Builder<'_> {
     }
 
     /// The colour that an element stands for.
-    fn constant(&self, node: &Node, purpose: Purpose, expected: &str) -> Option<Rgb> {
+    pub(super) fn constant(&self, node: &Node, purpose: Purpose, expected: &str) -> Option<Rgb> {
         let text = node.attr("value").map(|a| a.value.as_str());
         let parsed = match (node.tag.as_str(), text) {
             ("blackbody", _) => return self.blackbody(node),

@@ -32,6 +32,7 @@ impl Builder<'_> {
             self.sampling_weight(&props);
             self.scene.emitters.push(EmitterDesc { kind, span: Some(props.span()) });
         }
+        self.check_media(&props);
         props.finish();
     }
 

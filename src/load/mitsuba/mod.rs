@@ -14,7 +14,10 @@ mod encoding;
 mod indices;
 mod integrator;
 mod limits;
+mod medium;
+mod medium_presets;
 mod objects;
+mod phase;
 mod plugins;
 mod props;
 mod sensor;
@@ -24,6 +27,7 @@ mod sun;
 mod texture;
 mod transform;
 mod values;
+mod volume;
 
 use super::LoadOptions;
 use super::assets::Assets;
@@ -37,7 +41,7 @@ use std::path::Path;
 pub(super) use transform::look_at;
 
 /// Elements that may stand directly in a scene.
-const TOP_LEVEL: [&str; 13] = [
+const TOP_LEVEL: [&str; 14] = [
     "integrator",
     "sensor",
     "film",
@@ -49,6 +53,7 @@ const TOP_LEVEL: [&str; 13] = [
     "emitter",
     "medium",
     "volume",
+    "phase",
     "ref",
     "spectrum",
 ];
@@ -89,10 +94,9 @@ impl Builder<'_> {
                 "emitter" => self.emitter(child),
                 // Built when something refers to them; those that nobody uses are still checked below.
                 "bsdf" | "texture" | "film" | "sampler" | "rfilter" => {}
-                // Where something refers to a medium, this is reported there.
-                "medium" | "volume" if !self.referenced.contains(&child) => self.ignored_medium(child),
                 "ref" => self.reference(child),
-                "medium" | "volume" | "spectrum" => {}
+                // Without effect where nothing refers to them.
+                "medium" | "volume" | "phase" | "spectrum" => {}
                 tag => {
                     let d = Diagnostic::error(
                         "scene::misplaced-element",
@@ -132,15 +136,6 @@ impl Builder<'_> {
             // Everything else has an effect only where something refers to it.
             _ => {}
         }
-    }
-
-    fn ignored_medium(&mut self, node: usize) {
-        let node = &self.tree.nodes[node];
-        let d = Diagnostic::warning(
-            "scene::medium-ignored",
-            format!("participating media are not supported: this <{}> is ignored", node.tag),
-        );
-        self.push(d.at(node.span.clone()));
     }
 }
 

@@ -7,7 +7,7 @@ use crate::load::assets::Assets;
 use crate::load::paths::locate_or_warn;
 use crate::load::report::Report;
 use crate::scene::diag::{Diagnostic, nearest};
-use crate::scene::{BsdfId, GroupId, SceneDesc, Span, TextureId};
+use crate::scene::{BsdfId, GroupId, MediumId, SceneDesc, Span, TextureId};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
@@ -27,6 +27,7 @@ pub(super) struct Builder<'t> {
     pub bsdfs: HashMap<usize, Option<BsdfId>>,
     pub textures: HashMap<usize, Option<TextureId>>,
     pub groups: HashMap<usize, Option<GroupId>>,
+    pub media: HashMap<usize, Option<MediumId>>,
     /// Elements that a `<ref>` inside of another object names.
     pub referenced: HashSet<usize>,
     /// Elements under construction, outermost first.
@@ -47,6 +48,7 @@ impl<'t> Builder<'t> {
             bsdfs: HashMap::new(),
             textures: HashMap::new(),
             groups: HashMap::new(),
+            media: HashMap::new(),
             referenced,
             open: Vec::new(),
         }

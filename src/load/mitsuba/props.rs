@@ -93,6 +93,11 @@ impl<'t> Props<'t> {
         self.report.borrow_mut().push(Diagnostic::error(code, message).at(self.span()));
     }
 
+    /// Reports what is not supported of the whole plugin.
+    pub(super) fn unsupported(&self, message: impl Into<String>) {
+        self.report.borrow_mut().push(Diagnostic::unsupported(message).at(self.span()).help(FORCE));
+    }
+
     /// The element that gives a property, if there is one.
     pub(super) fn get(&self, name: &'static str) -> Option<&'t Node> {
         self.get_index(name).map(|i| &self.tree.nodes[i])
@@ -118,10 +123,15 @@ impl<'t> Props<'t> {
 
     /// Nested objects and references that are not asked for by name: index of the element.
     pub(super) fn objects(&self) -> Vec<usize> {
+        self.objects_that(|_| true)
+    }
+
+    /// As [`Props::objects`], those alone that are `wanted`.
+    pub(super) fn objects_that(&self, wanted: impl Fn(usize) -> bool) -> Vec<usize> {
         let mut found = Vec::new();
         for item in self.items.iter().filter(|i| !i.used.get()) {
             let tag = self.tree.nodes[item.node].tag.as_str();
-            if tag == "ref" || OBJECT_TAGS.contains(&tag) {
+            if (tag == "ref" || OBJECT_TAGS.contains(&tag)) && wanted(item.node) {
                 item.used.set(true);
                 found.push(item.node);
             }

@@ -1,6 +1,6 @@
 //! Cameras and films.
 
-use super::objects::{Builder, FORCE};
+use super::objects::Builder;
 use super::props::Props;
 use crate::scene::diag::Diagnostic;
 use crate::scene::{FilmDesc, FilterDesc, FovAxis, SensorDesc};
@@ -35,17 +35,13 @@ impl Builder<'_> {
         let principal_point = if thin { [0.0; 2] } else { offset };
         let to_world = p.transform("to_world").unwrap_or(DMat4::IDENTITY);
 
-        let (mut film, mut sample_count) = (None, None);
+        let (mut film, mut sample_count, mut medium) = (None, None, None);
         for object in p.objects() {
             let Some(object) = self.resolve(object) else { continue };
             match self.node(object).tag.as_str() {
                 "film" => film = self.film(object),
                 "sampler" => sample_count = self.sampler(object),
-                "medium" => self.push(
-                    Diagnostic::unsupported("participating media are not supported")
-                        .at(self.node(object).span.clone())
-                        .help(FORCE),
-                ),
+                "medium" => medium = self.medium(object),
                 tag => {
                     let d =
                         Diagnostic::error("scene::misplaced-element", format!("a <{tag}> has no place in a <sensor>"));
@@ -70,7 +66,7 @@ impl Builder<'_> {
             far_clip,
             aperture_radius,
             focus_distance,
-            medium: None,
+            medium,
             film,
             sample_count,
             span: Some(p.span()),

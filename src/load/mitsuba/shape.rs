@@ -1,7 +1,7 @@
 //! Shapes, groups of shapes, and their instances.
 
 use super::document::OBJECT_TAGS;
-use super::objects::{Builder, FORCE};
+use super::objects::Builder;
 use super::props::Props;
 use super::spectrum::Purpose::Emission;
 use crate::load::assets::MeshSource;
@@ -10,8 +10,8 @@ use crate::load::primitives::Primitive;
 use crate::math::{Frame, Rgb};
 use crate::scene::diag::Diagnostic;
 use crate::scene::{
-    AreaEmission, BsdfDesc, BsdfId, ColorDesc, DiffuseParams, GroupDesc, GroupId, InstanceDesc, RoundKind, ShapeDesc,
-    ShapeGeometry, Span,
+    AreaEmission, BsdfDesc, BsdfId, BsdfKind, ColorDesc, DiffuseParams, GroupDesc, GroupId, InstanceDesc,
+    InterfaceDesc, RoundKind, ShapeDesc, ShapeGeometry, Span,
 };
 use glam::{DMat4, DVec3};
 
@@ -38,6 +38,7 @@ struct Parts {
     /// A BSDF or a reference to one.
     material: Option<usize>,
     emission: Option<AreaEmission>,
+    interface: Option<InterfaceDesc>,
 }
 
 impl Source {
@@ -136,20 +137,25 @@ impl Builder<'_> {
     fn surface(&mut self, p: &Props<'_>) -> Option<ShapeDesc> {
         let mut outline = self.outline(p)?;
         let flip_normals = p.boolean_or("flip_normals", false);
-        let Parts { material, emission } = self.parts(p);
+        let Parts { material, emission, interface } = self.parts(p);
         p.finish();
         let mut bsdf = material.and_then(|m| self.bsdf(m));
         outline.options.colors = material.map_or(MeshColors::Unused, |m| self.mesh_colors(m));
-        // As in Mitsuba 3, a light without a material reflects nothing.
-        if emission.is_some() && bsdf.is_none() {
-            let kind = DiffuseParams { reflectance: ColorDesc::Constant(Rgb::BLACK) }.into();
+        let default = match (emission.is_some(), interface.is_some() && p.element().legacy) {
+            // As in Mitsuba 3, a light without a material reflects nothing.
+            (true, _) => Some(DiffuseParams { reflectance: ColorDesc::Constant(Rgb::BLACK) }.into()),
+            // As in Mitsuba 0.6, a medium ends invisibly. In Mitsuba 3 its surface is a diffuse one.
+            (false, true) => Some(BsdfKind::Null),
+            (false, false) => None,
+        };
+        if let Some(kind) = default.filter(|_| bsdf.is_none()) {
             self.scene.bsdfs.push(BsdfDesc { name: None, kind, span: None });
             bsdf = Some(BsdfId((self.scene.bsdfs.len() - 1) as u32));
         }
         let to_world = outline.to_world;
         let geometry = self.geometry(outline, emission.is_some());
         let name = p.element().attr("id").map(|a| a.value.clone());
-        let (interface, span) = (None, Some(p.span()));
+        let span = Some(p.span());
         Some(ShapeDesc { geometry, to_world, bsdf, emission, interface, flip_normals, name, span })
     }
 
@@ -195,15 +201,18 @@ impl Builder<'_> {
 
     /// The elements inside of a surface.
     fn parts(&mut self, p: &Props<'_>) -> Parts {
-        let mut parts = Parts { material: p.get_index("bsdf"), emission: None };
+        let interface = self.interface(p);
+        let mut parts = Parts { material: p.get_index("bsdf"), emission: None, interface };
         for object in p.objects() {
             let Some(found) = self.resolve(object) else { continue };
             match self.node(found).tag.as_str() {
                 "bsdf" => parts.material = Some(object),
                 "emitter" => parts.emission = self.area_emission(found),
                 "medium" => {
-                    let d = Diagnostic::unsupported("participating media are not supported");
-                    self.push(d.at(self.node(object).span.clone()).help(FORCE));
+                    let d = Diagnostic::error("scene::misplaced-element", "this medium of a shape has no side");
+                    let node = self.node(object);
+                    let expected = "name=\"interior\" or name=\"exterior\"";
+                    self.push(d.at(node.span.clone()).label(format!("expected {expected}")));
                 }
                 tag => {
                     let d =
@@ -245,6 +254,7 @@ impl Builder<'_> {
         let radiance = self.color(&p, "radiance", 1.0, Emission);
         self.require_pictures(radiance, &p.span());
         self.sampling_weight(&p);
+        self.check_media(&p);
         p.finish();
         Some(AreaEmission { radiance, span: Some(p.span()) })
     }

@@ -98,8 +98,28 @@ const MISTAKES: &[(&str, &[&str])] = &[
     (r#"<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="¦3.5"/></film></sensor>"#, &["scene::bad-value"]),
     (r#"<sensor type="perspective"><float name="fov" value="¦180"/></sensor>"#, &["scene::bad-value"]),
     (r#"<sensor type="perspective"><film type="hdrfilm"><rfilter type="¦lanczos"/></film></sensor>"#, &["scene::replaced-plugin"]),
-    (r#"¦<medium type="homogeneous"/>"#, &["scene::medium-ignored"]),
-    (r#"<shape type="cube">¦<medium type="homogeneous" name="interior"/></shape>"#, &["scene::unsupported"]),
+    (r#"<shape type="cube">¦<medium type="homogeneous"/></shape>"#, &["scene::misplaced-element"]),
+    (r#"<shape type="cube">¦<medium type="homogeneous" name="inside"/></shape>"#, &["scene::misplaced-element"]),
+    (r#"<shape type="cube">¦<bsdf type="diffuse" name="interior"/></shape>"#, &["scene::wrong-type"]),
+    (r#"<shape type="cube"><medium type="¦homogenous" name="interior"/></shape>"#, &["scene::unknown-plugin"]),
+    (r#"<shape type="cube"><ref name="interior" id="¦fgo"/></shape><medium type="homogeneous" id="fog"/>"#, &["scene::undefined-reference"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="interior"><rgb name="albedo" value="¦0.2, 1.01, 1"/></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="exterior"><float name="sigma_t" value="¦-1"/></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="exterior"><float name="sigma_t" value="¦1e39"/></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="exterior"><float name="scale" value="¦-1"/></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="exterior"><float name="sigma_t" value="1e30"/><float name="scale" value="¦1e30"/></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube">¦<medium type="homogeneous" name="interior"><float name="sigma_t" value="1"/><float name="sigma_s" value="1"/><float name="sigma_a" value="1"/></medium></shape>"#, &["scene::duplicate-property"]),
+    (r#"<shape type="cube">¦<medium type="homogeneous" name="interior"><float name="sigma_s" value="1"/></medium></shape>"#, &["scene::missing-property"]),
+    (r#"<shape type="cube">¦<medium type="homogeneous" name="interior"><float name="sigma_s" value="3e38"/><float name="sigma_a" value="3e38"/></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="interior"><string name="material" value="¦skimmilc"/></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube">¦<medium type="homogeneous" name="interior"><phase type="hg"/><phase type="hg"/></medium></shape>"#, &["scene::nested-phase"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="interior"><phase type="hg"><float name="g" value="¦-1"/></phase></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="interior"><phase type="¦gh"/></medium></shape>"#, &["scene::unknown-plugin"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="interior">¦<phase type="blendphase"><phase type="hg"/></phase></medium></shape>"#, &["scene::nested-phase"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="interior"><phase type="blendphase"><float name="weight" value="¦1.5"/><phase type="hg"/><phase type="hg"/></phase></medium></shape>"#, &["scene::bad-value"]),
+    (r#"<shape type="cube"><medium type="homogeneous" name="interior">¦<phase type="blendphase"><phase type="hg"/><phase type="blendphase"><phase type="hg"/><phase type="hg"/></phase></phase></medium></shape>"#, &["scene::unsupported"]),
+    (r#"<phase type="blendphase" id="a"><phase type="hg"/>¦<ref id="a"/></phase><shape type="cube"><medium type="homogeneous" name="interior"><ref id="a"/></medium></shape>"#, &["scene::circular-reference"]),
+    (r#"<shape type="cube"><emitter type="area"><ref id="¦fog"/></emitter></shape>"#, &["scene::undefined-reference"]),
     (r#"<shape type="cube"><bsdf type="¦roughcoating"/></shape>"#, &["scene::unsupported"]),
     (r#"<shape type="instance">¦<ref id="g"/></shape><shape type="cube" id="g"/>"#, &["scene::wrong-type"]),
     (r#"<shape type="shapegroup"><shape type="cube">¦<emitter type="area"/></shape></shape>"#, &["scene::instanced-emitter"]),
@@ -502,6 +522,7 @@ mod creases;
 mod encodings;
 mod hostile;
 mod legacy;
+mod media;
 mod pictures;
 mod plugins;
 mod references;

@@ -33,7 +33,12 @@ fn scene_of(row: &Row, rows: &[Row]) -> String {
     // A thin lens without its radius is a mistake; alternatives exclude each other.
     let base = if row.parameter == "aperture_radius" { "" } else { base };
     let element = row.element;
-    let name = if element == "texture" { " name=\"reflectance\"" } else { "" };
+    let name = match element {
+        "texture" => " name=\"reflectance\"",
+        "medium" => " name=\"interior\"",
+        "volume" => " name=\"albedo\"",
+        _ => "",
+    };
     let object = format!("<{element} type=\"{}\"{name}>{base}{parameter}</{element}>", row.plugin);
     let inside = match (element, row.plugin) {
         ("texture", _) => format!("<bsdf type=\"diffuse\">{object}</bsdf>"),
@@ -159,12 +164,4 @@ fn rows_say_why_or_how() {
     for model in MODELS {
         assert!(rows().iter().any(|r| r.element == "bsdf" && r.plugin == model.name), "{}", model.name);
     }
-}
-
-#[test]
-fn media_are_refused_where_they_are_used() {
-    let used = "<medium type=\"homogeneous\" id=\"m\"/><shape type=\"cube\"><ref name=\"interior\" id=\"m\"/></shape>";
-    assert_eq!(messages(load(&scene(used))).iter().map(|m| m.0).collect::<Vec<_>>(), ["scene::unsupported"]);
-    let unused = "<medium type=\"homogeneous\" id=\"m\"/>";
-    assert_eq!(messages(load(&scene(unused))), [("scene::medium-ignored", 2, 1)]);
 }

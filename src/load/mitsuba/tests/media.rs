@@ -1,0 +1,140 @@
+//! Participating media and where they are.
+
+use super::*;
+
+/// A scene of version 0.6.
+fn old(inside: &str) -> SceneDesc {
+    let (scene, found) = load(&scene(inside).replacen("3.0.0", "0.6.0", 1)).unwrap_or_else(|e| panic!("{inside}: {e}"));
+    assert!(found.list.is_empty(), "{inside}: {:?}", found.list[0].message);
+    scene
+}
+
+/// A cube with a medium inside.
+fn cube(medium: &str, plugin: &str) -> String {
+    format!("<shape type=\"cube\"><medium type=\"{plugin}\" name=\"interior\">{medium}</medium></shape>")
+}
+
+/// Extinction and albedo of the only medium, which are constant.
+fn constants(scene: &SceneDesc) -> [Rgb; 2] {
+    let [medium] = scene.media.as_slice() else { panic!("{} media", scene.media.len()) };
+    let (&VolumeDesc::Constant(sigma_t), &VolumeDesc::Constant(albedo)) = (&medium.sigma_t, &medium.albedo) else {
+        panic!("{medium:?}")
+    };
+    [sigma_t * medium.scale, albedo]
+}
+
+fn near(got: [Rgb; 2], want: [[f32; 3]; 2]) {
+    for (got, want) in got.into_iter().zip(want) {
+        for (i, want) in want.into_iter().enumerate() {
+            assert!((got[i] - want).abs() <= 1e-5 * want.abs(), "{got:?} is not {want:?}");
+        }
+    }
+}
+
+#[test]
+fn coefficients_are_given_in_any_of_two_ways() {
+    let medium = |inside| constants(&good(&cube(inside, "homogeneous")));
+    near(medium(""), [[1.0; 3], [0.75; 3]]);
+    near(medium("<float name=\"scale\" value=\"3\"/><float name=\"albedo\" value=\"0\"/>"), [[3.0; 3], [0.0; 3]]);
+    let both = "<rgb name=\"sigma_t\" value=\"2, 3, 0\"/><rgb name=\"albedo\" value=\"0.1, 0.2, 1\"/>";
+    near(medium(both), [[2.0, 3.0, 0.0], [0.1, 0.2, 1.0]]);
+    let sigmas = "<rgb name=\"sigma_s\" value=\"1, 3, 0\"/><rgb name=\"sigma_a\" value=\"1, 1, 0\"/>";
+    near(medium(sigmas), [[2.0, 4.0, 0.0], [0.5, 0.75, 0.0]]);
+    // A spectrum as Mitsuba 3.9.1, scalar_rgb, has it before it is clamped to 1.
+    let [sigma_t, _] = medium("<spectrum name=\"sigma_t\" value=\"400:2, 700:3\"/>");
+    assert!([2.794_83, 2.475_97, 2.125_86].iter().zip([0, 1, 2]).all(|(v, i)| (sigma_t[i] - v).abs() < 0.01));
+    let volume = "<volume name=\"sigma_t\" type=\"constvolume\"><rgb name=\"value\" value=\"1 2 3\"/></volume>";
+    near(constants(&good(&cube(volume, "heterogeneous"))), [[1.0, 2.0, 3.0], [0.75; 3]]);
+    let shared =
+        format!("{}<volume id=\"v\" type=\"constvolume\"/>", cube("<ref name=\"albedo\" id=\"v\"/>", "heterogeneous"));
+    near(constants(&good(&shared)), [[1.0; 3], [1.0; 3]]);
+}
+
+/// Numbers of Mitsuba 0.6: materials are in 1/cm there for all that its documentation says, and scattering is reduced.
+#[test]
+fn media_of_version_06_have_their_defaults() {
+    let medium = |inside| constants(&old(&cube(inside, "homogeneous")));
+    let skin = [[77.2, 105.0, 149.0], [74.0 / 77.2, 88.0 / 105.0, 101.0 / 149.0]];
+    near(medium(""), skin);
+    near(
+        medium("<string name=\"material\" value=\"Skin1\"/><float name=\"scale\" value=\"0.01\"/>"),
+        [[0.772, 1.05, 1.49], skin[1]],
+    );
+    let milk = [1820.52 * 0.25, 2038.26 * 0.286, 2236.98 * 0.319];
+    let absorbed = [0.153, 0.46, 1.993];
+    let sigma_t: [f32; 3] = std::array::from_fn(|i| milk[i] + absorbed[i]);
+    let albedo = std::array::from_fn(|i| milk[i] / sigma_t[i]);
+    near(medium("<string name=\"material\" value=\"Regular Milk\"/>"), [sigma_t, albedo]);
+    near(
+        medium("<spectrum name=\"sigmaT\" value=\"2\"/><spectrum name=\"albedo\" value=\"0.1, 0.2, 0.3\"/>"),
+        [[2.0; 3], [0.1, 0.2, 0.3]],
+    );
+    // One alone is joined by that of the default.
+    near(
+        medium("<spectrum name=\"sigmaA\" value=\"26\"/>"),
+        [[100.0, 114.0, 127.0], [0.74, 88.0 / 114.0, 101.0 / 127.0]],
+    );
+    let volumes = "<volume name=\"density\" type=\"constvolume\"><float name=\"value\" value=\"3\"/></volume>\
+        <volume name=\"albedo\" type=\"constvolume\"><spectrum name=\"value\" value=\"0.9\"/></volume>";
+    near(constants(&old(&cube(volumes, "heterogeneous"))), [[3.0; 3], [0.9; 3]]);
+    let lacking = load(&scene(&cube("", "heterogeneous")).replacen("3.0.0", "0.6.0", 1)).unwrap_err();
+    assert_eq!(messages(Err(lacking)).iter().map(|m| m.0).collect::<Vec<_>>(), ["scene::missing-property"; 2]);
+}
+
+#[test]
+fn phase_functions_are_read() {
+    let phase = |inside: &str| good(&cube(inside, "homogeneous")).media[0].phase.clone();
+    let hg = |g| PhaseDesc::HenyeyGreenstein { g };
+    assert_eq!(phase(""), PhaseDesc::Isotropic);
+    assert_eq!(phase("<phase type=\"isotropic\"/>"), PhaseDesc::Isotropic);
+    assert_eq!(phase("<phase type=\"rayleigh\"/>"), PhaseDesc::Rayleigh);
+    assert_eq!(phase("<phase type=\"hg\"/>"), hg(0.8));
+    assert_eq!(phase("<phase name=\"p\" type=\"hg\"><float name=\"g\" value=\"-0.25\"/></phase>"), hg(-0.25));
+    // In the order of the file, whatever their names, as in Mitsuba 3.9.1.
+    let blend = "<phase type=\"blendphase\"><float name=\"weight\" value=\"0.3\"/><phase name=\"b\" type=\"hg\"/>\
+        <phase name=\"a\" type=\"rayleigh\"/></phase>";
+    let phases = Box::new([hg(0.8), PhaseDesc::Rayleigh]);
+    assert_eq!(phase(blend), PhaseDesc::Blend { weight: 0.3, phases });
+    let shared = format!("<phase type=\"hg\" id=\"p\"/>{}", cube("<ref id=\"p\"/>", "homogeneous"));
+    assert_eq!(good(&shared).media[0].phase, hg(0.8));
+}
+
+#[test]
+fn shapes_lights_and_cameras_name_media() {
+    let s = good(
+        "<medium type=\"homogeneous\" id=\"fog\"/><medium type=\"homogeneous\" id=\"milk\"/>
+        <medium type=\"homogeneous\" id=\"unused\"><float name=\"sigma_t\" value=\"-1\"/></medium>
+        <sensor type=\"perspective\"><ref id=\"fog\"/></sensor>
+        <emitter type=\"point\"><ref id=\"fog\"/></emitter>
+        <shape type=\"sphere\"><emitter type=\"area\"><ref name=\"medium\" id=\"fog\"/></emitter></shape>
+        <shape type=\"cube\"><ref name=\"exterior\" id=\"fog\"/><ref name=\"interior\" id=\"milk\"/></shape>
+        <shape type=\"cube\"><ref name=\"interior\" id=\"fog\"/></shape>
+        <shape type=\"shapegroup\"><shape type=\"cube\"><ref name=\"exterior\" id=\"milk\"/></shape></shape>",
+    );
+    let (fog, milk) = (Some(MediumId(0)), Some(MediumId(1)));
+    assert_eq!((s.media.len(), s.sensors[0].medium, s.sensors[1].medium), (2, None, fog));
+    let interfaces: Vec<_> = s.shapes.iter().map(|shape| shape.interface).collect();
+    assert_eq!(
+        interfaces,
+        [
+            None,
+            None,
+            Some(InterfaceDesc { interior: milk, exterior: fog }),
+            Some(InterfaceDesc { interior: fog, exterior: None }),
+        ]
+    );
+    let grouped = s.groups[0].shapes[0].interface;
+    assert_eq!(grouped, Some(InterfaceDesc { interior: None, exterior: milk }));
+}
+
+/// A medium that ends at a shape without material: invisible in Mitsuba 0.6, diffuse in Mitsuba 3.9.1.
+#[test]
+fn borders_without_a_material_follow_the_version() {
+    let xml = cube("", "homogeneous");
+    assert_eq!(good(&xml).shapes[1].bsdf, None);
+    let s = old(&xml);
+    assert!(s.shapes[1].bsdf.is_some_and(|b| matches!(s.bsdfs[b.index()].kind, BsdfKind::Null)));
+    let s =
+        old("<shape type=\"cube\"><bsdf type=\"diffuse\"/><medium type=\"homogeneous\" name=\"exterior\"/></shape>");
+    assert!(s.shapes[1].bsdf.is_some_and(|b| matches!(s.bsdfs[b.index()].kind, BsdfKind::Model(_))));
+}
