@@ -17,6 +17,7 @@ mod polygon;
 mod primitives;
 mod report;
 mod serialized;
+mod vol;
 
 use crate::scene::diag::{Diagnostic, Diagnostics};
 use crate::scene::{SceneDesc, validate};

@@ -2,6 +2,7 @@
 
 use super::desc::{EmitterKind, MeshDesc, MeshId, SceneDesc, ShapeDesc, ShapeGeometry};
 use super::diag::{Diagnostic, Diagnostics, Span};
+use super::medium::VolumeDesc;
 use glam::DMat4;
 use rayon::prelude::*;
 
@@ -35,6 +36,13 @@ pub fn validate(scene: &SceneDesc, out: &mut Diagnostics) {
         | EmitterKind::SunSky { to_world, .. } = &emitter.kind
         {
             transform(to_world, "emitter", emitter.span.as_ref(), out);
+        }
+    }
+    for medium in &scene.media {
+        for volume in [&medium.sigma_t, &medium.albedo] {
+            if let VolumeDesc::Grid(grid) = volume {
+                transform(&grid.to_world, "volume", medium.span.as_ref(), out);
+            }
         }
     }
     meshes(scene, &all, out);

@@ -3,6 +3,7 @@
 use super::medium_presets;
 use super::objects::Builder;
 use super::props::Props;
+use super::volume::{Quantity, Volume};
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, nearest};
 use crate::scene::{InterfaceDesc, MediumDesc, MediumId, PhaseDesc, VolumeDesc};
@@ -17,8 +18,8 @@ const LEGACY_PRESET: &str = "skin1";
 
 /// Extinction before `scale`, and albedo.
 struct MediumCoefficients {
-    sigma_t: VolumeDesc,
-    albedo: VolumeDesc,
+    sigma_t: Volume,
+    albedo: Volume,
 }
 
 impl Builder<'_> {
@@ -71,7 +72,8 @@ impl Builder<'_> {
             return None;
         }
         let MediumCoefficients { sigma_t, albedo } = self.medium_coefficients(p);
-        let scale = self.medium_scale(p, &sigma_t);
+        let scale = self.medium_scale(p, sigma_t.largest);
+        let (sigma_t, albedo) = (sigma_t.desc, albedo.desc);
         let phase = match self.nested_with_tag(p, "phase").as_slice() {
             [] => PhaseDesc::Isotropic,
             &[phase] => self.phase(phase).unwrap_or(PhaseDesc::Isotropic),
@@ -84,15 +86,12 @@ impl Builder<'_> {
         Some(MediumDesc { sigma_t, albedo, scale, phase, span: Some(p.span()) })
     }
 
-    fn medium_scale(&self, p: &Props<'_>, sigma_t: &VolumeDesc) -> f32 {
+    /// `scale`, with which the extinction, `largest` at most, must not become negative or infinite.
+    fn medium_scale(&self, p: &Props<'_>, largest: f32) -> f32 {
         let scale = p.float_or("scale", 1.0);
-        let largest = match sigma_t {
-            VolumeDesc::Constant(c) => f64::from(c.max_component()),
-            VolumeDesc::Grid(_) => 1.0,
-        };
         let problem = if scale < 0.0 {
             format!("a `scale` of {scale} makes the extinction negative")
-        } else if scale as f32 > f32::MAX || scale * largest > f64::from(f32::MAX) {
+        } else if scale.max(scale * f64::from(largest)) > f64::from(f32::MAX) {
             format!("a `scale` of {scale} makes an extinction that is not finite")
         } else {
             return scale as f32;
@@ -126,10 +125,11 @@ impl Builder<'_> {
                 p.error("scene::missing-property", format!("the medium plugin `heterogeneous` needs `{name}`"));
             }
         }
-        let [sigma_t, albedo] = default.map(VolumeDesc::Constant);
+        let [sigma_t, albedo] = default.map(Volume::constant);
+        let density = Quantity { name: extinction, largest: f32::MAX };
         MediumCoefficients {
-            sigma_t: self.volume(p, extinction, f32::MAX).unwrap_or(sigma_t),
-            albedo: self.volume(p, "albedo", 1.0).unwrap_or(albedo),
+            sigma_t: self.volume(p, density).unwrap_or(sigma_t),
+            albedo: self.volume(p, Quantity { name: "albedo", largest: 1.0 }).unwrap_or(albedo),
         }
     }
 
@@ -143,7 +143,7 @@ impl Builder<'_> {
                     format!("`sigma_a` and `sigma_s` belong together: `{name}` is missing"),
                 );
             }
-            match self.volume(p, name, f32::MAX) {
+            match self.volume(p, Quantity { name, largest: f32::MAX }).map(|volume| volume.desc) {
                 Some(VolumeDesc::Constant(c)) => c,
                 Some(VolumeDesc::Grid(_)) => {
                     let message = format!("a grid of `{name}` is not supported: give grids of `sigma_t` and `albedo`");
@@ -159,10 +159,8 @@ impl Builder<'_> {
         if !sigma_t.is_finite() {
             p.error("scene::bad-value", "the sum of `sigma_a` and `sigma_s` is not finite");
         }
-        MediumCoefficients {
-            sigma_t: VolumeDesc::Constant(sigma_t),
-            albedo: VolumeDesc::Constant(share(sigma_s, sigma_t)),
-        }
+        let [sigma_t, albedo] = [sigma_t, share(sigma_s, sigma_t)].map(Volume::constant);
+        MediumCoefficients { sigma_t, albedo }
     }
 }
 

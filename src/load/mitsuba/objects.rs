@@ -3,6 +3,7 @@
 use super::document::{Node, Tree};
 use super::plugins;
 use super::props::Props;
+use super::volume::SharedGrid;
 use crate::load::assets::Assets;
 use crate::load::paths::locate_or_warn;
 use crate::load::report::Report;
@@ -28,6 +29,8 @@ pub(super) struct Builder<'t> {
     pub textures: HashMap<usize, Option<TextureId>>,
     pub groups: HashMap<usize, Option<GroupId>>,
     pub media: HashMap<usize, Option<MediumId>>,
+    /// Grids by their files.
+    pub grids: HashMap<PathBuf, Option<SharedGrid>>,
     /// Elements that a `<ref>` inside of another object names.
     pub referenced: HashSet<usize>,
     /// Elements under construction, outermost first.
@@ -49,6 +52,7 @@ impl<'t> Builder<'t> {
             textures: HashMap::new(),
             groups: HashMap::new(),
             media: HashMap::new(),
+            grids: HashMap::new(),
             referenced,
             open: Vec::new(),
         }

@@ -138,3 +138,96 @@ fn borders_without_a_material_follow_the_version() {
         old("<shape type=\"cube\"><bsdf type=\"diffuse\"/><medium type=\"homogeneous\" name=\"exterior\"/></shape>");
     assert!(s.shapes[1].bsdf.is_some_and(|b| matches!(s.bsdfs[b.index()].kind, BsdfKind::Model(_))));
 }
+
+/// Loads a scene beside the file `a.vol` of the samples given, with the box (−1, −2, −3) … (1, 2, 3).
+fn with_grid(xml: &str, size: [u32; 3], values: &[f32]) -> Result<(SceneDesc, Diagnostics), LoadFailure> {
+    let mut file = b"VOL\x03".to_vec();
+    let channels = values.len() as u32 / size.iter().product::<u32>();
+    file.extend([1].iter().chain(&size).chain(&[channels]).flat_map(|n: &u32| n.to_le_bytes()));
+    file.extend([-1.0f32, -2.0, -3.0, 1.0, 2.0, 3.0].iter().chain(values).flat_map(|v| v.to_le_bytes()));
+    let files = Files::new(&[("s.xml", xml)]);
+    std::fs::write(files.0.path().join("a.vol"), file).unwrap();
+    files.load(&LoadOptions::default())
+}
+
+fn grid_volume(name: &str, inside: &str) -> String {
+    format!("<volume name=\"{name}\" type=\"gridvolume\"><string name=\"filename\" value=\"a.vol\"/>{inside}</volume>")
+}
+
+/// The grid of the extinction of the only medium.
+fn only_grid(scene: &SceneDesc) -> &GridDesc {
+    match scene.media[0].sigma_t {
+        VolumeDesc::Grid(ref grid) => grid,
+        VolumeDesc::Constant(value) => panic!("{value:?}"),
+    }
+}
+
+#[test]
+fn grids_are_read_once_and_placed() {
+    let to_world = "<transform name=\"to_world\"><translate x=\"5\"/></transform>";
+    let two =
+        [grid_volume("sigma_t", to_world), grid_volume("albedo", "<string name=\"wrap_mode\" value=\"mirror\"/>")];
+    let xml = scene(&cube(&two.concat(), "heterogeneous"));
+    let (s, found) = with_grid(&xml, [2, 1, 1], &[0.25, 1.0]).unwrap();
+    assert!(found.list.is_empty());
+    let VolumeDesc::Grid(albedo) = &s.media[0].albedo else { panic!() };
+    let sigma_t = only_grid(&s);
+    assert!(std::sync::Arc::ptr_eq(&albedo.grid, &sigma_t.grid));
+    assert_eq!(sigma_t.grid.values, GridValues::Float32(vec![0.25, 1.0]));
+    assert_eq!((sigma_t.wrap, albedo.wrap), (VolumeWrap::Clamp, VolumeWrap::Mirror));
+    assert_eq!((sigma_t.to_world, albedo.to_world), (DMat4::from_translation(DVec3::X * 5.0), DMat4::IDENTITY));
+    // The box of the file, only if asked for.
+    let inside = format!("<boolean name=\"use_grid_bbox\" value=\"true\"/>{to_world}");
+    let xml = scene(&cube(&grid_volume("sigma_t", &inside), "heterogeneous"));
+    let (s, _) = with_grid(&xml, [1, 1, 1], &[2.0, 3.0, 4.0]).unwrap();
+    assert_eq!(only_grid(&s).grid.channels, 3);
+    let corner = |v| only_grid(&s).to_world.transform_point3(v);
+    assert_eq!((corner(DVec3::ZERO), corner(DVec3::ONE)), (DVec3::new(4.0, -2.0, -3.0), DVec3::new(6.0, 2.0, 3.0)));
+}
+
+/// In Mitsuba 0.6 grids fill the box of their file, with samples in its corners, and there is nothing beyond.
+#[test]
+fn grids_of_version_06_have_samples_in_their_corners() {
+    let load = |inside: &str| {
+        let albedo = "<volume name=\"albedo\" type=\"constvolume\"><float name=\"value\" value=\"0.5\"/></volume>";
+        let medium = format!("{}{albedo}", grid_volume("density", inside));
+        let xml = scene(&cube(&medium, "heterogeneous")).replacen("3.0.0", "0.6.0", 1);
+        with_grid(&xml, [2, 3, 5], &[0.5; 30]).unwrap().0
+    };
+    let place = |s: &SceneDesc, sample: [f64; 3]| {
+        let grid = only_grid(s);
+        let middle = (DVec3::from_array(sample) + 0.5) / DVec3::from_array(grid.grid.size.map(f64::from));
+        assert_eq!(grid.wrap, VolumeWrap::Empty);
+        grid.to_world.transform_point3(middle)
+    };
+    let s = load("");
+    assert!(place(&s, [0.0; 3]).distance(DVec3::new(-1.0, -2.0, -3.0)) < 1e-12);
+    assert!(place(&s, [1.0, 2.0, 4.0]).distance(DVec3::new(1.0, 2.0, 3.0)) < 1e-12);
+    assert!(place(&s, [0.0, 1.0, 1.0]).distance(DVec3::new(-1.0, 0.0, -1.5)) < 1e-12);
+    let s = load(
+        "<point name=\"min\" x=\"0\" y=\"0\" z=\"0\"/><point name=\"max\" x=\"1\" y=\"1\" z=\"1\"/>\
+        <transform name=\"toWorld\"><scale value=\"2\"/></transform>",
+    );
+    assert!(place(&s, [1.0, 1.0, 0.0]).distance(DVec3::new(2.0, 1.0, 0.0)) < 1e-12);
+}
+
+#[test]
+fn grids_with_mistakes_are_refused() {
+    let codes = |name: &str, values: &[f32], inside: &str| {
+        let xml = scene(&cube(&grid_volume(name, inside), "heterogeneous"));
+        messages(with_grid(&xml, [2, 1, 1], values)).iter().map(|m| m.0).collect::<Vec<_>>()
+    };
+    assert!(codes("sigma_t", &[0.0, 7.0], "").is_empty());
+    assert_eq!(codes("albedo", &[0.5, 1.5], ""), ["load::volume"]);
+    assert_eq!(codes("sigma_t", &[0.5, -1.5], ""), ["load::volume"]);
+    assert_eq!(codes("sigma_t", &[0.5, f32::NAN], ""), ["load::volume"]);
+    assert_eq!(codes("sigma_t", &[0.5; 12], ""), ["scene::unsupported"]);
+    assert_eq!(codes("sigma_t", &[0.5; 4], ""), ["load::volume"]);
+    assert!(codes("sigma_s", &[0.5; 2], "").contains(&"scene::unsupported"));
+    let flat = "<transform name=\"to_world\"><scale x=\"0\"/></transform>";
+    assert_eq!(codes("sigma_t", &[0.5; 2], flat), ["scene::bad-transform"]);
+    let missing = cube(&grid_volume("sigma_t", "").replace("a.vol", "b.vol"), "heterogeneous");
+    assert_eq!(messages(with_grid(&scene(&missing), [1; 3], &[1.0])), [("load::volume", 2, 137)]);
+    let huge = cube(&format!("{}<float name=\"scale\" value=\"1e38\"/>", grid_volume("sigma_t", "")), "heterogeneous");
+    assert_eq!(messages(with_grid(&scene(&huge), [1; 3], &[7.0]))[0].0, "scene::bad-value");
+}

@@ -61,6 +61,8 @@ fn folder() -> Files {
     let files = Files::new(&[("a.obj", obj), ("a.ply", ply)]);
     let serialized = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/meshes/version4.serialized");
     std::fs::copy(serialized, files.0.path().join("a.serialized")).unwrap();
+    let volume = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/volumes/mitsuba.vol");
+    std::fs::copy(volume, files.0.path().join("a.vol")).unwrap();
     image::GrayImage::from_pixel(2, 2, image::Luma([128])).save(files.0.path().join("a.png")).unwrap();
     files
 }
