@@ -16,9 +16,14 @@
 //! The throughput is multiplied by T / p or T / P. With E = ⅓ Σ_c T_c, which is the same from either end, both are E
 //! times the *collision rate* κ of the end: ⅓ Σ_c σ_t,c T_c / E in a medium, one on a surface ([`collision_rate`]).
 
+pub mod build;
 pub mod flight;
+pub mod grid;
+mod lattice;
 
+pub use build::MediumFault;
 pub use flight::{Collision, Flight, FlightTarget};
+pub use grid::GridMedium;
 
 use crate::math::{Rgb, Vec3};
 use crate::shade::phase::{Phase, PhaseScattering};
@@ -107,14 +112,17 @@ pub struct Medium {
 pub enum MediumContent {
     /// The same everywhere.
     Homogeneous(Coefficients),
+    /// Given on grids.
+    Grid(Box<GridMedium>),
 }
 
 impl Medium {
     /// The coefficients at a point.
     #[inline]
-    pub fn coefficients(&self, _p: Vec3) -> Coefficients {
+    pub fn coefficients(&self, p: Vec3) -> Coefficients {
         match &self.content {
             MediumContent::Homogeneous(coefficients) => *coefficients,
+            MediumContent::Grid(grid) => grid.coefficients(p),
         }
     }
 
@@ -129,27 +137,38 @@ impl Medium {
 
     /// τ of each channel on the way of length `length` from `o` in the unit direction `d`.
     #[inline]
-    pub fn optical_depth(&self, _o: Vec3, _d: Vec3, length: f32) -> Rgb {
+    pub fn optical_depth(&self, o: Vec3, d: Vec3, length: f32) -> Rgb {
         match &self.content {
-            // Where nothing is absorbed, an infinite way has no depth.
-            MediumContent::Homogeneous(c) => c.sigma_t.map(|s| if s > 0.0 { s * length } else { 0.0 }),
+            MediumContent::Homogeneous(c) => depth_of(c.sigma_t, length),
+            MediumContent::Grid(grid) => grid.optical_depth(o, d, length),
         }
     }
 
     /// Flies from `o` in the unit direction `d` over `length` at most.
     #[inline]
-    pub fn fly(&self, _o: Vec3, _d: Vec3, length: f32, target: FlightTarget) -> Flight {
+    pub fn fly(&self, o: Vec3, d: Vec3, length: f32, target: FlightTarget) -> Flight {
         match &self.content {
-            MediumContent::Homogeneous(c) => {
-                let sigma = c.sigma_t.to_array()[target.channel];
-                let t = target.depth / sigma;
-                // Without extinction the quotient is infinite or, of two zeros, no number.
-                match t < length {
-                    true => Flight::Collided(Collision { t, depth: c.sigma_t * t }),
-                    false => Flight::Passed { depth: c.sigma_t.map(|s| if s > 0.0 { s * length } else { 0.0 }) },
-                }
-            }
+            MediumContent::Homogeneous(c) => fly_through(c.sigma_t, length, target),
+            MediumContent::Grid(grid) => grid.fly(o, d, length, target),
         }
+    }
+}
+
+/// τ of a way through a constant extinction. Without extinction, an infinite way has no depth.
+#[inline]
+fn depth_of(sigma_t: Rgb, length: f32) -> Rgb {
+    sigma_t.map(|s| if s > 0.0 { s * length } else { 0.0 })
+}
+
+/// A flight through a constant extinction.
+#[inline]
+fn fly_through(sigma_t: Rgb, length: f32, target: FlightTarget) -> Flight {
+    let sigma = sigma_t.to_array()[target.channel];
+    let t = target.depth / sigma;
+    // Without extinction the quotient is infinite or, of two zeros, no number.
+    match t < length {
+        true => Flight::Collided(Collision { t, depth: sigma_t * t }),
+        false => Flight::Passed { depth: depth_of(sigma_t, length) },
     }
 }
 
@@ -170,3 +189,6 @@ pub fn collision_rate(sigma_t: Rgb, passing: Rgb) -> f32 {
     }
     (sigma_t * passing).mean() / passing.mean()
 }
+
+#[cfg(test)]
+mod tests;
