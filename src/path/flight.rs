@@ -12,6 +12,7 @@ use crate::math::Rgb;
 use crate::math::sampler::PathSampler;
 use crate::media::{Collision, Flight, FlightTarget, MediumNumber, MediumPoint, transmittance};
 use crate::prepared::PreparedScene;
+use crate::ray::offset::offset_point;
 use crate::ray::transmittance::{MAX_CROSSINGS, beyond};
 use crate::ray::{Hit, MaskLookup, MaskPoint, Ray, RayKind, Segment, SurfaceMask, Tracer, Transmittance};
 use crate::shade::{Material, SurfacePoint};
@@ -103,14 +104,14 @@ fn gather(
     tracer: &mut Tracer,
 ) -> Option<SegmentFlight> {
     let (mut depth, mut holes, mut rest) = (Rgb::BLACK, 1.0, *segment);
-    let (scale, direction) = (segment.d.length(), segment.d.normalize());
+    let direction = segment.d.normalize();
     for _ in 0..MAX_CROSSINGS {
         let hit = match scene.has_crossings() {
             true => tracer.closest_of(&rest.ray(), SurfaceMask::MASKS, RayKind::Mask),
             false => None,
         };
         if let Some(medium) = scene.media.get(medium) {
-            let length = scale * hit.map_or(rest.t_max, |hit| hit.t);
+            let length = rest.d.length() * hit.map_or(rest.t_max, |hit| hit.t);
             depth += medium.optical_depth(rest.o, direction, length);
         }
         let Some(hit) = hit else {
@@ -123,10 +124,7 @@ fn gather(
             return None;
         }
         medium = scene.medium_beside(&hit, point.ng.dot(direction)).unwrap_or(medium);
-        let o = crate::ray::offset::offset_point(point.p, point.error, point.ng, rest.d);
-        // The far end stays where it is.
-        let d = if rest.t_max.is_finite() { segment.o + segment.d - o } else { rest.d };
-        rest = Segment { o, d, t_max: rest.t_max };
+        rest = segment.rest_from(offset_point(point.p, point.error, point.ng, rest.d));
     }
     tracer.stats.invalid += 1;
     None

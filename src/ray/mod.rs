@@ -94,7 +94,7 @@ pub struct Segment {
     pub o: Vec3,
     /// To the far point, or, with an infinite `t_max`, the direction.
     pub d: Vec3,
-    /// [`T_SEGMENT`] or infinite.
+    /// [`T_SEGMENT`], infinite, or another length where the camera's far clipping plane ends it.
     pub t_max: f32,
 }
 
@@ -107,6 +107,16 @@ impl Segment {
     /// From a point that is off its surface to infinity.
     pub fn to_infinity(o: Vec3, d: Vec3) -> Segment {
         Segment { o, d, t_max: f32::INFINITY }
+    }
+
+    /// What is left of it from `o` on, a point of it but for rounding: the far end stays where it is.
+    pub fn rest_from(&self, o: Vec3) -> Segment {
+        if self.t_max.is_infinite() {
+            return Segment { o, ..*self };
+        }
+        // The factor is one for the usual segment.
+        let end = self.o + self.d * (self.t_max / T_SEGMENT);
+        Segment { o, d: end - o, t_max: T_SEGMENT }
     }
 
     /// As a ray.

@@ -117,10 +117,7 @@ impl Tracer<'_> {
             if transmittance.is_zero() {
                 return Transmittance::ZERO;
             }
-            let o = offset_point(p, error, ng, rest.d);
-            // The far end stays where it is.
-            let d = if rest.t_max.is_finite() { segment.o + segment.d - o } else { rest.d };
-            rest = Segment { o, d, t_max: rest.t_max };
+            rest = segment.rest_from(offset_point(p, error, ng, rest.d));
         }
         self.stats.invalid += 1;
         Transmittance::ZERO

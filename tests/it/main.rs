@@ -17,6 +17,7 @@ mod images;
 mod kills;
 mod leaks;
 mod masks;
+mod media;
 mod measure;
 mod options;
 mod outputs;

@@ -118,6 +118,11 @@ impl Picture {
         Picture::exact(vec![[value; 3]; pixels])
     }
 
+    /// One colour everywhere.
+    pub fn constant_rgb(value: [f64; 3], pixels: usize) -> Picture {
+        Picture::exact(vec![value; pixels])
+    }
+
     /// The window `[x, y, width, height]` of a picture that has rows of `row` pixels. Its mean gets an upper bound of
     /// the variance, as if the errors of all pixels were the same.
     pub fn window(&self, row: u32, [x, y, width, height]: [u32; 4]) -> Picture {
