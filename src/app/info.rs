@@ -89,6 +89,9 @@ fn describe_prepared(scene: &PreparedScene) {
     if !scene.geometry.round.is_empty() {
         out!("round       {} spheres, disks and cylinders", scene.geometry.round_count());
     }
+    if !scene.media.is_empty() {
+        out!("media       {}", scene.media.len());
+    }
     out!("lights      {} (every emitting triangle is one)", scene.lights.len());
     let (radius, DVec3 { x, y, z }) = (f64::from(scene.radius) * scene.unit, scene.centre);
     if scene.unit == 1.0 {

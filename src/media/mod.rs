@@ -72,6 +72,11 @@ impl MediumSet {
         self.media.get(usize::from(number.0))
     }
 
+    /// Number of media.
+    pub fn len(&self) -> usize {
+        self.media.len()
+    }
+
     /// There are none.
     pub fn is_empty(&self) -> bool {
         self.media.is_empty()

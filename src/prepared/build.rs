@@ -49,6 +49,9 @@ pub enum PrepareError {
     /// Transforms are beyond single precision; the diagnostics say which.
     #[error("the scene's transforms cannot be used")]
     Transforms,
+    /// Media are impossible; the diagnostics say which.
+    #[error("the scene's participating media cannot be used")]
+    Media,
     /// The scene is larger than single precision can hold.
     #[error("the scene reaches {0:e} from its centre, which is beyond the range of single precision")]
     Extent(f32),
@@ -92,7 +95,7 @@ impl PreparedScene {
         let mut features =
             features(&desc, &sensor, &materials, &lights, &meshes, window != [0, 0, film_size[0], film_size[1]]);
         features.set(Features::MASKS, geometry.has_any_of(SurfaceMask::MASKS));
-        let media = build_media(&desc.media);
+        let media = build_media(&desc.media, centre, diagnostics)?;
         features.set(Features::MEDIA, !media.is_empty());
         let geometry = Arc::new(geometry);
         let start = Instant::now();

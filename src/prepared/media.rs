@@ -1,13 +1,13 @@
 //! Participating media in their places: which medium is on which side of a surface, and around cameras and lights.
 
-use super::PreparedScene;
+use super::{PrepareError, PreparedScene};
 use crate::emit::{Light, LightId};
-use crate::math::Vec3;
-use crate::media::{Coefficients, Medium, MediumContent, MediumNumber, MediumPoint, MediumSet};
+use crate::math::{DVec3, Vec3};
+use crate::media::{Medium, MediumNumber, MediumPoint, MediumSet};
 use crate::ray::offset::{SegmentEnd, offset_point};
 use crate::ray::{Hit, Ray, RayKind, SurfaceMask, T_MIN, Tracer};
-use crate::scene::{InterfaceDesc, MediumDesc, MediumId, PhaseDesc, VolumeDesc};
-use crate::shade::{Phase, PhaseLobe, PhaseScattering};
+use crate::scene::{Diagnostic, Diagnostics, InterfaceDesc, MediumDesc, MediumId};
+use crate::shade::PhaseScattering;
 
 /// The media on both sides of a surface that separates media.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,28 +46,25 @@ pub struct Surroundings {
     pub lights: Vec<MediumNumber>,
 }
 
-/// The media of a description.
-pub(super) fn build_media(media: &[MediumDesc]) -> MediumSet {
-    MediumSet::new(media.iter().map(build).collect())
-}
-
-fn build(desc: &MediumDesc) -> Medium {
-    let constant = |volume: &VolumeDesc| match volume {
-        VolumeDesc::Constant(value) => *value,
-        VolumeDesc::Grid(_) => crate::math::Rgb::BLACK,
-    };
-    let sigma_t = constant(&desc.sigma_t) * desc.scale;
-    let sigma_s = sigma_t * constant(&desc.albedo);
-    let lobe = |phase: &PhaseDesc| match *phase {
-        PhaseDesc::HenyeyGreenstein { g } => PhaseLobe::HenyeyGreenstein(g),
-        PhaseDesc::Rayleigh => PhaseLobe::Rayleigh,
-        _ => PhaseLobe::Isotropic,
-    };
-    let phase = match &desc.phase {
-        PhaseDesc::Blend { weight, phases } => Phase { lobes: [lobe(&phases[0]), lobe(&phases[1])], second: *weight },
-        phase => Phase::single(lobe(phase)),
-    };
-    Medium { content: MediumContent::Homogeneous(Coefficients { sigma_t, sigma_s }), phase }
+/// The media of a description, for positions relative to `centre`.
+pub(super) fn build_media(
+    media: &[MediumDesc],
+    centre: DVec3,
+    diagnostics: &mut Diagnostics,
+) -> Result<MediumSet, PrepareError> {
+    if MediumNumber::new(media.len()).is_none() {
+        let message = format!("the scene has {} media: at most 65534 are supported", media.len());
+        diagnostics.push(Diagnostic::error("scene::too-many-media", message));
+        return Err(PrepareError::Media);
+    }
+    let mut built = vec![];
+    for desc in media {
+        match Medium::build(desc, centre) {
+            Ok(medium) => built.push(medium),
+            Err(fault) => diagnostics.push(Diagnostic::unsupported(fault.to_string()).at(desc.span.clone())),
+        }
+    }
+    if built.len() < media.len() { Err(PrepareError::Media) } else { Ok(MediumSet::new(built)) }
 }
 
 impl PreparedScene {
