@@ -388,3 +388,31 @@ fn what_cannot_be_built_is_said() {
     desc.phase = blend([PhaseDesc::Isotropic, desc.phase]);
     assert_eq!(Medium::build(&desc, DVec3::ZERO).err(), Some(MediumFault::NestedMixture));
 }
+
+/// The extinction at points inside and outside of the unit cube of an oblique grid, as tests/data/volumes/print_extinction.py
+/// prints it with Mitsuba 3.9.1, scalar_rgb.
+#[test]
+fn grids_are_looked_up_as_in_mitsuba() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/volumes/filters.xml");
+    let (scene, found) = crate::load::load_scene(&path, &Default::default()).unwrap();
+    assert!(found.list.is_empty());
+    let points = [[0.9, 0.3, 0.2], [0.6, 0.75, 0.7], [1.35, 0.95, 0.8], [0.55, 0.1, -0.45]].map(DVec3::from_array);
+    let mitsuba = [
+        [0.504_422_8, 1.968_653_3, 2.377_091_2, 0.076_226],
+        [0.0, 2.75, 1.0, 1.5],
+        [0.504_422_8, 2.041_201_4, 2.377_091_2, 0.420_360_2],
+    ];
+    assert_eq!(scene.media.len(), mitsuba.len());
+    let centre = DVec3::new(0.5, 0.25, 0.0);
+    for (desc, values) in scene.media.iter().zip(mitsuba) {
+        let medium = Medium::build(desc, centre).unwrap();
+        for (point, value) in points.into_iter().zip(values) {
+            let got = medium.coefficients((point - centre).as_vec3()).sigma_t;
+            assert!((got.r - value).abs() < 2e-6 && got.r == got.g, "{point} {got:?} {value}");
+        }
+        // The box around the grid ends at z = −0.5 and 0.866, and begins at x = 0.5, as Mitsuba says.
+        for beyond in [[0.9, 0.3, -0.501], [0.9, 0.3, 0.867], [0.49, 0.3, 0.0]].map(DVec3::from_array) {
+            assert_eq!(medium.coefficients((beyond - centre).as_vec3()), Coefficients::default());
+        }
+    }
+}
