@@ -9,6 +9,8 @@ use crate::texture;
 pub fn scene() -> Scene {
     let purpose = "A door ajar and a lamp in the next room: nearly all light is indirect and comes through the gap.";
     let mut s = Scene::new("door", purpose, 24, 1024);
+    let fog = "The door scene in thin fog: light that comes through the gap is seen on its way, too.";
+    s.foggy("foggy-door", fog, 0.12, 0.95);
     s.camera([-0.95, 1.45, 4.15], [0.3, 1.08, 0.0], 58.0);
     s.file("textures/planks.png", texture::planks([0.56, 0.49, 0.41], [0.8, 0.73, 0.64], 4, 3).png());
     s.file("textures/landscape.png", texture::landscape(21).png());

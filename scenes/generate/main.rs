@@ -42,15 +42,17 @@ fn main() -> io::Result<()> {
          | scene | what it is for | triangles | lights | size | licence |\n|---|---|---:|---|---:|---|\n",
     );
     for scene in scenes {
-        let r = scene.write(&out)?;
-        table += &format!(
-            "| [{0}]({0}/{0}.xml) | {1} | {2} | {3} | {4} kB | MIT OR Apache-2.0 |\n",
-            r.name,
-            r.purpose,
-            r.triangles,
-            r.lights,
-            r.bytes.div_ceil(1000)
-        );
+        for r in scene.write(&out)? {
+            table += &format!(
+                "| [{}]({}) | {} | {} | {} | {} kB | MIT OR Apache-2.0 |\n",
+                r.name,
+                r.file,
+                r.purpose,
+                r.triangles,
+                r.lights,
+                r.bytes.div_ceil(1000)
+            );
+        }
     }
     fs::write(out.join("README.md"), table)
 }

@@ -37,6 +37,7 @@ struct NamedMesh {
 /// A scene's row of the table in `scenes/README.md`.
 pub struct Row {
     pub name: &'static str,
+    pub file: String,
     pub purpose: &'static str,
     pub triangles: usize,
     pub lights: String,
@@ -58,6 +59,14 @@ pub struct Scene {
     emitters: String,
     infinite: Vec<&'static str>,
     files: Vec<(String, Vec<u8>)>,
+    variant: Option<Variant>,
+}
+
+/// The scene once more in another file, filled with a medium.
+struct Variant {
+    name: &'static str,
+    purpose: &'static str,
+    medium: String,
 }
 
 /// `a, b, c`, shortest form.
@@ -86,6 +95,7 @@ impl Scene {
             emitters: String::new(),
             infinite: Vec::new(),
             files: Vec::new(),
+            variant: None,
         }
     }
 
@@ -103,6 +113,17 @@ impl Scene {
             list(origin),
             list(target)
         );
+    }
+
+    /// Writes the scene also as `name`, full of a medium of this extinction per metre and albedo that scatters equally in
+    /// all directions.
+    pub fn foggy(&mut self, name: &'static str, purpose: &'static str, sigma_t: f64, albedo: f64) {
+        let medium = format!(
+            "        <medium type=\"homogeneous\">{}{}</medium>\n",
+            rgb("sigma_t", [sigma_t; 3]),
+            rgb("albedo", [albedo; 3])
+        );
+        self.variant = Some(Variant { name, purpose, medium });
     }
 
     fn material(&mut self, id: &str, twosided: bool, kind: &str, params: &[String]) {
@@ -242,15 +263,16 @@ impl Scene {
         self.emitters += &format!("    <emitter type=\"constant\">\n        {radiance}\n    </emitter>\n");
     }
 
-    fn xml(&self) -> String {
+    /// The file `name`; `medium` is what the camera is in.
+    fn xml(&self, name: &str, purpose: &str, medium: &str) -> String {
         let mut x = format!(
             "<!-- {}: {} Units: metres, y up. Written by scenes/generate. -->\n<scene version=\"3.0.0\">\n    \
              <integrator type=\"path\">\n        <integer name=\"max_depth\" value=\"{}\"/>\n    </integrator>\n\n    \
-             <sensor type=\"perspective\">\n{}        <sampler type=\"independent\">\n            \
+             <sensor type=\"perspective\">\n{}{medium}        <sampler type=\"independent\">\n            \
              <integer name=\"sample_count\" value=\"{}\"/>\n        </sampler>\n        <film type=\"hdrfilm\">\n            \
              <integer name=\"width\" value=\"{}\"/>\n            <integer name=\"height\" value=\"{}\"/>\n            \
              <rfilter type=\"gaussian\"/>\n        </film>\n    </sensor>\n\n",
-            self.name, self.purpose, self.max_depth, self.sensor, self.spp, self.size[0], self.size[1]
+            name, purpose, self.max_depth, self.sensor, self.spp, self.size[0], self.size[1]
         );
         x += &self.materials;
         if !self.emitters.is_empty() {
@@ -279,7 +301,7 @@ impl Scene {
     }
 
     /// Writes the scene's folder into `out` and returns its line of the table.
-    pub fn write(&self, out: &Path) -> io::Result<Row> {
+    pub fn write(&self, out: &Path) -> io::Result<Vec<Row>> {
         let folder = out.join(self.name);
         if folder.exists() {
             fs::remove_dir_all(&folder)?;
@@ -292,7 +314,11 @@ impl Scene {
             path.parent().map_or(Ok(()), fs::create_dir_all)?;
             fs::write(path, data)
         };
-        save(&format!("{}.xml", self.name), self.xml().as_bytes())?;
+        save(&format!("{}.xml", self.name), self.xml(self.name, self.purpose, "").as_bytes())?;
+        let variant_xml = self.variant.as_ref().map(|v| (v, self.xml(v.name, v.purpose, &v.medium)));
+        if let Some((variant, xml)) = &variant_xml {
+            fs::write(folder.join(format!("{}.xml", variant.name)), xml)?;
+        }
         for m in &self.meshes {
             save(&format!("meshes/{}.ply", m.name), &m.mesh.ply(m.textured))?;
         }
@@ -306,7 +332,12 @@ impl Scene {
             lights.push(format!("{lamps} lamp{}", if lamps == 1 { "" } else { "s" }));
         }
         lights.extend(self.infinite.iter().map(ToString::to_string));
-        Ok(Row { name: self.name, purpose: self.purpose, triangles, lights: lights.join(" + "), bytes })
+        let row = |name, purpose, bytes| {
+            let file = format!("{}/{name}.xml", self.name);
+            Row { name, file, purpose, triangles, lights: lights.join(" + "), bytes }
+        };
+        let variant_row = variant_xml.iter().map(|(v, xml)| row(v.name, v.purpose, xml.len() as u64));
+        Ok(std::iter::once(row(self.name, self.purpose, bytes)).chain(variant_row).collect())
     }
 }
 

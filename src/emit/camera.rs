@@ -151,6 +151,11 @@ impl Camera {
         self.orientation.z()
     }
 
+    /// The point at which the ray from the lens point `p` in the unit direction `direction` passes the near clipping plane.
+    pub fn near_point(&self, p: Vec3, direction: Vec3) -> Vec3 {
+        p + direction * (self.near / direction.dot(self.axis()))
+    }
+
     /// The camera has no lens: its position is a delta.
     pub fn is_pinhole(&self) -> bool {
         self.lens_radius == 0.0

@@ -168,12 +168,14 @@ impl<F: ConnectionFactor> PathView<'_, F> {
         let mut flight = |i: usize| {
             // From the vertex nearer to the lens, which is never at infinity.
             let from = path.interior.get(i - 1);
-            let end = from.map_or(SegmentEnd::Free(path.lens), |v| v.place.segment_end());
             let before = match i {
                 1 => path.origin.end.segment_end(),
                 _ => Some(path.interior[i - 2].place.segment_end()),
             };
             let (d, medium) = (-path.edge(i - 1).0, self.scene.surroundings.camera);
+            // What is nearer than the near clipping plane is not seen.
+            let near = || SegmentEnd::Free(self.scene.camera.near_point(path.lens, d));
+            let end = from.map_or_else(near, |v| v.place.segment_end());
             let edge = before.map_or_else(|| Segment::to_infinity(end.leaving(d), d), |before| segment(&end, &before));
             let medium = from.map_or(medium, |v| v.medium_towards(d));
             let flight = segment_flight(self.scene, &edge, medium, &mut tracer)?;

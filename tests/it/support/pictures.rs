@@ -27,9 +27,15 @@ const SLIVER: f64 = 1e-2;
 
 /// Reads a scene from the text of a Mitsuba file and the files that it names.
 pub fn parse(xml: &str, files: &[(&str, &str)]) -> SceneDesc {
+    let files: Vec<(&str, Vec<u8>)> = files.iter().map(|(name, text)| (*name, text.as_bytes().to_vec())).collect();
+    parse_beside(xml, &files)
+}
+
+/// Reads the content of a scene file beside which other files stand.
+pub fn parse_beside(xml: &str, files: &[(&str, Vec<u8>)]) -> SceneDesc {
     let folder = tempfile::tempdir().unwrap();
-    for (name, text) in files {
-        std::fs::write(folder.path().join(name), text).unwrap();
+    for (name, bytes) in files {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
     }
     let path = folder.path().join("scene.xml");
     std::fs::write(&path, format!("<scene version=\"3.0.0\">{xml}</scene>")).unwrap();
