@@ -3,6 +3,8 @@
 //! The optical depth of a ray is the sum over the grid's cells that it passes. Inside of a cell a density interpolated
 //! between eight samples is a cubic polynomial of the distance, and Gauss's rule with two points integrates it exactly,
 //! by a sum of values that are not negative. Nothing is left to chance, and no digits cancel.
+//!
+//! What is done for each cell is inlined: calls that hand over cells and their samples take as long as the rest.
 
 use super::flight::{Collision, Flight, FlightTarget};
 use super::lattice::{Blocks, Cells, Lattice, Stretch, Way, clipped};
@@ -217,7 +219,7 @@ enum CellDensity<const C: usize> {
 }
 
 impl<T: GridValue, const C: usize> Samples<'_, T, C> {
-    #[inline]
+    #[inline(always)]
     fn cell(self, lattice: &Lattice, cell: [i32; 3]) -> CellDensity<C> {
         let [x, y, z] = lattice.corners(cell);
         let [nx, ny] = [lattice.size.x as usize, lattice.size.y as usize];
@@ -252,7 +254,7 @@ impl<T: GridValue, const C: usize> Samples<'_, T, C> {
 
 impl<const C: usize> CellDensity<C> {
     /// The density at a place in the cell.
-    #[inline]
+    #[inline(always)]
     fn at(&self, f: [f32; 3]) -> [f32; C] {
         match self {
             CellDensity::Constant(v) => *v,
@@ -265,7 +267,7 @@ impl<const C: usize> CellDensity<C> {
     }
 
     /// ∫ density from the distance `begin` to `end`, both in the cell.
-    #[inline]
+    #[inline(always)]
     fn depth(&self, cells: &Cells<'_>, cell: [i32; 3], begin: f64, end: f64) -> [f64; C] {
         let length = end - begin;
         let mut out = [0.0; C];
@@ -285,7 +287,7 @@ impl<const C: usize> CellDensity<C> {
 }
 
 /// Linear in x, y and z between values at the corners of a cell.
-#[inline]
+#[inline(always)]
 fn interpolated(corners: &[f32; 8], [x, y, z]: [f32; 3]) -> f32 {
     let mix = |a: f32, b: f32, f: f32| a * (1.0 - f) + b * f;
     let [a, b, c, d, e, f, g, h] = *corners;

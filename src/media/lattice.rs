@@ -113,7 +113,7 @@ impl Lattice {
     }
 
     /// Samples of a cell along x, y and z.
-    #[inline]
+    #[inline(always)]
     pub(super) fn corners(&self, cell: [i32; 3]) -> [Pair; 3] {
         let upper = i32::from(self.filter == VolumeFilter::Trilinear);
         let mut corners = [[0; 2]; 3];
@@ -196,7 +196,7 @@ struct Axis {
 
 impl Axis {
     /// The distance at which the ray leaves a cell.
-    #[inline]
+    #[inline(always)]
     fn exit(&self, cell: i32) -> f64 {
         if cell == self.outermost || self.inverse.is_infinite() {
             return f64::INFINITY;
@@ -221,7 +221,7 @@ pub(super) struct Cells<'l> {
 
 impl Cells<'_> {
     /// The place in a cell of the point at the distance `t`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn inside(&self, cell: [i32; 3], t: f64) -> [f32; 3] {
         let mut out = [0.0; 3];
         for i in 0..3 {
@@ -238,7 +238,7 @@ impl Cells<'_> {
     }
 
     /// Goes to the next cell, or to the end of the ray.
-    #[inline]
+    #[inline(always)]
     fn step(&mut self) {
         let [x, y, z] = self.exits;
         let i = if x < y {
@@ -289,7 +289,7 @@ impl Cells<'_> {
 impl Iterator for Cells<'_> {
     type Item = Stretch;
 
-    #[inline]
+    #[inline(always)]
     fn next(&mut self) -> Option<Stretch> {
         while self.t < self.end {
             if self.is_new
