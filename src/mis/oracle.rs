@@ -111,7 +111,7 @@ impl<F: ConnectionFactor> PathView<'_, F> {
             origin.light,
             origin.end.normal(),
             origin.direction,
-            path.interior.first().map_or(Vec3::ZERO, |v| v.position()),
+            path.interior.first().map_or(Vec3::ZERO, Interior::position),
         );
         let (position, direction) = (f64::from(position.0), f64::from(direction.0));
         let infinite = light.is_infinite();

@@ -80,7 +80,7 @@ impl FullPath {
                 EmitterVertex::Infinite => None,
             }
         } else {
-            Some(self.interior.get(i - 1).map_or(self.lens, |v| v.position()))
+            Some(self.interior.get(i - 1).map_or(self.lens, Interior::position))
         }
     }
 
