@@ -18,7 +18,7 @@ impl FlightTarget {
         FlightTarget { channel: ((3.0 * u[0]) as usize).min(2), depth: -(-u[1]).ln_1p() }
     }
 
-    /// What is left of it beyond a way of this optical depth.
+    /// The target that remains after a way of this optical depth.
     #[inline]
     #[must_use]
     pub fn after(self, depth: Rgb) -> FlightTarget {

@@ -4,7 +4,7 @@
 //! between eight samples is a cubic polynomial of the distance, and Gauss's rule with two points integrates it exactly,
 //! by a sum of values that are not negative. Nothing is left to chance, and no digits cancel.
 //!
-//! What is done for each cell is inlined: calls that hand over cells and their samples take as long as the rest.
+//! The work on a cell is inlined: calls that hand over cells and their samples take as long as the rest.
 
 use super::flight::{Collision, Flight, FlightTarget};
 use super::lattice::{Blocks, Cells, Lattice, Stretch, Way, clipped};

@@ -106,16 +106,16 @@ pub struct MediumPoint {
 /// A medium.
 #[derive(Debug)]
 pub struct Medium {
-    /// What it is made of.
+    /// Composition.
     pub content: MediumContent,
     /// How it scatters.
     pub phase: Phase,
 }
 
-/// What a medium is made of.
+/// Composition of a medium.
 #[derive(Debug)]
 pub enum MediumContent {
-    /// The same everywhere.
+    /// Uniform in space.
     Homogeneous(Coefficients),
     /// Given on grids.
     Grid(Box<GridMedium>),

@@ -173,7 +173,7 @@ impl<F: ConnectionFactor> PathView<'_, F> {
                 _ => Some(path.interior[i - 2].place.segment_end()),
             };
             let (d, medium) = (-path.edge(i - 1).0, self.scene.surroundings.camera);
-            // What is nearer than the near clipping plane is not seen.
+            // Nothing nearer than the near clipping plane is seen.
             let near = || SegmentEnd::Free(self.scene.camera.near_point(path.lens, d));
             let end = from.map_or_else(near, |v| v.place.segment_end());
             let edge = before.map_or_else(|| Segment::to_infinity(end.leaving(d), d), |before| segment(&end, &before));

@@ -17,7 +17,7 @@ use crate::ray::transmittance::{MAX_CROSSINGS, beyond};
 use crate::ray::{Hit, MaskLookup, MaskPoint, Ray, RayKind, Segment, SurfaceMask, Tracer, Transmittance};
 use crate::shade::{Material, SurfacePoint};
 
-/// What free flight along an edge adds to throughputs and densities. Without media, nothing.
+/// Effect of free flight along an edge on throughputs and densities: none without media.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeFlight {
     /// T / E per channel.
@@ -216,10 +216,11 @@ impl<'s> FlyingEdge<'s, '_> {
         let SegmentFlight { transmittance, .. } = SegmentFlight::new(holes, passing);
         self.edge.transmittance = transmittance;
         let rate = |sigma_t: Option<Rgb>| sigma_t.map_or(1.0, |s| crate::media::collision_rate(s, passing));
-        self.edge.flight = FreeFlight {
-            ratio: passing * (1.0 / passing.mean()),
-            rate: rate(extinction),
-            rate_back: rate(self.extinction_back),
+        let (rate, rate_back) = (rate(extinction), rate(self.extinction_back));
+        self.edge.flight = match rate > 0.0 {
+            true => FreeFlight { ratio: passing * (1.0 / passing.mean()), rate, rate_back },
+            // The search in a grid ended by rounding where there is nothing: such a collision carries no light.
+            false => FreeFlight { ratio: Rgb::BLACK, rate: 1.0, rate_back },
         };
     }
 }

@@ -109,7 +109,7 @@ impl Segment {
         Segment { o, d, t_max: f32::INFINITY }
     }
 
-    /// What is left of it from `o` on, a point of it but for rounding: the far end stays where it is.
+    /// The rest of it from `o` on, a point of it but for rounding: the far end stays where it is.
     pub fn rest_from(&self, o: Vec3) -> Segment {
         if self.t_max.is_infinite() {
             return Segment { o, ..*self };

@@ -26,7 +26,7 @@ pub struct MediumDesc {
 /// A quantity that may change from point to point.
 #[derive(Clone, Debug)]
 pub enum VolumeDesc {
-    /// The same everywhere.
+    /// Uniform in space.
     Constant(Rgb),
     /// Given on a grid.
     Grid(GridDesc),
@@ -41,7 +41,7 @@ pub struct GridDesc {
     pub to_world: DMat4,
     /// How values are looked up between samples.
     pub filter: VolumeFilter,
-    /// What is outside of the grid.
+    /// Values outside of the grid.
     pub wrap: VolumeWrap,
 }
 
@@ -128,7 +128,7 @@ pub enum VolumeFilter {
     Trilinear,
 }
 
-/// What is outside of a grid.
+/// Values outside of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VolumeWrap {
     /// The nearest values of the border.
