@@ -323,6 +323,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
 }
 
 impl<S: ConnectionStrategy, K: ContributionSink> WalkHooks for EyeHooks<'_, S, K> {
+    #[inline(always)]
     fn vertex(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
         let (rules, scene) = (self.rules, self.rules.iteration.scene);
         self.lookups = [None; 2];

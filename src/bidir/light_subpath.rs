@@ -210,6 +210,7 @@ impl<S: ConnectionStrategy> LightHooks<'_, '_, S> {
 }
 
 impl<S: ConnectionStrategy> WalkHooks for LightHooks<'_, '_, S> {
+    #[inline(always)]
     fn vertex(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
         self.arrive(vertex, tracer);
         if let Some(replay) = &mut self.purpose.replay {

@@ -219,6 +219,24 @@ mod tests {
     }
 
     #[test]
+    fn numbers_of_an_edge_are_stratified_each_by_itself_and_independent() {
+        let mut cells = [0u32; 16];
+        for pixel in 0..16 {
+            let mut strata = [[0u32; 256]; 2];
+            for iteration in 0..256 {
+                let mut sampler = PathSampler::new(3, 0, pixel, iteration);
+                let (u, v) = (sampler.flight(1), sampler.flight(2));
+                (0..2).for_each(|d| strata[d][(u[d] * 256.0) as usize] += 1);
+                cells[(u[0] * 4.0) as usize * 4 + (v[1] * 4.0) as usize] += 1;
+            }
+            assert!(strata.iter().flatten().all(|&n| n == 1), "pixel {pixel}");
+        }
+        // 256 expected in each; 15 degrees of freedom: more than 38 once in a thousand.
+        let chi2: f64 = cells.iter().map(|&n| (f64::from(n) - 256.0).powi(2) / 256.0).sum();
+        assert!(chi2 < 38.0, "{chi2}");
+    }
+
+    #[test]
     fn numbers_beyond_the_sobol_points_are_uniform_and_independent() {
         // Pairs of lanes and pairs of neighbouring vertices, in an 8 × 8 grid of cells.
         const N: usize = 64_000;

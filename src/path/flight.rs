@@ -60,23 +60,34 @@ pub struct SegmentFlight {
     pub transmittance: Transmittance,
     /// T, of media alone.
     passing: Rgb,
+    /// The scene has media.
+    has_media: bool,
 }
 
 impl SegmentFlight {
-    /// Nothing is on the segment.
+    /// A segment in a scene without media, of which masks are asked for elsewhere.
     pub const FREE: SegmentFlight =
-        SegmentFlight { light: Rgb::WHITE, transmittance: Transmittance::ONE, passing: Rgb::WHITE };
+        SegmentFlight { light: Rgb::WHITE, transmittance: Transmittance::ONE, passing: Rgb::WHITE, has_media: false };
+
+    /// The scene has no media.
+    #[inline]
+    pub fn is_free(&self) -> bool {
+        !self.has_media
+    }
 
     /// Past masks of which all together let `holes` of the light through, and media of the transmittance `passing`.
     fn new(holes: f32, passing: Rgb) -> SegmentFlight {
         let mut transmittance = Transmittance::ONE;
         transmittance *= holes * passing.mean();
-        SegmentFlight { light: passing * holes, transmittance, passing }
+        SegmentFlight { light: passing * holes, transmittance, passing, has_media: true }
     }
 
     /// The flight along the segment as an edge from `from` to `to`; the lens and lights are `None`.
     #[inline]
     pub fn edge(&self, from: Option<&StoredPlace>, to: Option<&StoredPlace>) -> FreeFlight {
+        if self.is_free() {
+            return FreeFlight::NONE;
+        }
         let rate = |place: Option<&StoredPlace>| place.map_or(1.0, |place| place.collision_rate(self.passing));
         FreeFlight { ratio: self.passing * (1.0 / self.passing.mean()), rate: rate(to), rate_back: rate(from) }
     }
@@ -140,8 +151,8 @@ pub(super) enum Arrival<'s> {
     Collided(MediumPoint),
 }
 
-/// An edge of a walk in a scene with media.
-pub(super) struct FlyingEdge<'s, 'a> {
+/// An edge of a walk that is to be found.
+pub(super) struct NextEdge<'s, 'a> {
     pub scene: &'s PreparedScene,
     pub ray: Ray,
     /// The medium around the walk; on arrival, that before the surface or around the collision.
@@ -157,8 +168,34 @@ pub(super) struct FlyingEdge<'s, 'a> {
     pub index: u32,
 }
 
-impl<'s> FlyingEdge<'s, '_> {
-    /// Flies, and writes down the edge. Emission that the walk passes is shown to the hooks.
+impl<'s> NextEdge<'s, '_> {
+    /// Meets a surface in a scene without media, behind the holes of masks if there are any. Emission that the walk
+    /// passes is shown to the hooks.
+    #[inline(always)]
+    pub fn meet(
+        &mut self,
+        has_masks: bool,
+        kind: RayKind,
+        tracer: &mut Tracer,
+        sampler: &mut PathSampler,
+        hooks: &mut impl WalkHooks,
+    ) -> Arrival<'s> {
+        let NextEdge { scene, ray, index, throughput, .. } = *self;
+        let Some(hit) = tracer.closest(&ray, kind) else { return Arrival::Escaped };
+        self.edge.distance = hit.t;
+        let material = scene.surface_point_into(&hit, self.point);
+        if !has_masks {
+            return Arrival::Surface(hit, material);
+        }
+        let mut passage = Passage { scene, ray, edge: self.edge, hit, point: self.point };
+        let passed = |passage: &Passage| passage.show_emission(index, throughput, hooks);
+        match passage.go_on(material, kind, tracer, sampler.rng(), passed) {
+            Some((hit, material)) => Arrival::Surface(hit, material),
+            None => Arrival::Escaped,
+        }
+    }
+
+    /// Flies in a scene with media, and writes down the edge. Emission that the walk passes is shown to the hooks.
     #[cold]
     pub fn fly(
         &mut self,

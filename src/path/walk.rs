@@ -6,9 +6,8 @@
 //! hook ends it. [`Transport`] says whether it carries radiance or importance.
 
 use super::directions::DirectionSampler;
-use super::flight::{Arrival, FlyingEdge};
+use super::flight::{Arrival, NextEdge};
 use super::iteration::Iteration;
-use super::passage::Passage;
 use super::roulette::PathLimits;
 use super::vertex::{Edge, Place, Scatter, Vertex};
 use crate::math::sampler::{PathSampler, SampleSlot};
@@ -110,42 +109,56 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
     sampler: &mut PathSampler,
     hooks: &mut H,
 ) {
+    match scene.media.is_empty() {
+        true => walk_in::<false, H, D>(scene, start, rules, tracer, sampler, hooks),
+        false => walk_in_media(scene, start, rules, tracer, sampler, hooks),
+    }
+}
+
+/// Out of line: the walk of all other scenes stays small.
+#[cold]
+#[inline(never)]
+fn walk_in_media<H: WalkHooks, D: DirectionSampler>(
+    scene: &PreparedScene,
+    start: WalkStart,
+    rules: &WalkRules<D>,
+    tracer: &mut Tracer,
+    sampler: &mut PathSampler,
+    hooks: &mut H,
+) {
+    walk_in::<true, H, D>(scene, start, rules, tracer, sampler, hooks);
+}
+
+/// Walks in a scene with or without media.
+#[inline(always)]
+fn walk_in<const MEDIA: bool, H: WalkHooks, D: DirectionSampler>(
+    scene: &PreparedScene,
+    start: WalkStart,
+    rules: &WalkRules<D>,
+    tracer: &mut Tracer,
+    sampler: &mut PathSampler,
+    hooks: &mut H,
+) {
     let WalkStart { ray, mut throughput, pdf, mut kind, mut medium } = start;
     let WalkRules { limits, mode, directions } = *rules;
     let Ray { mut o, mut d, mut t_min, mut t_max } = ray;
     let mut edge = Edge::new(o, pdf);
-    let (has_masks, has_media) = (scene.features.contains(Features::MASKS), !scene.media.is_empty());
+    let has_masks = scene.features.contains(Features::MASKS);
     let mut extinction_back = None;
     let mut point = SurfacePoint::default();
     let mut bsdf = Bsdf::empty(&point);
     for index in 1..=limits.max_edges {
         let ray = Ray { o, d, t_min, t_max };
         let (wo, unattenuated) = (-d, throughput);
-        let arrival = if has_media {
-            let (edge, point) = (&mut edge, &mut point);
-            let mut flying = FlyingEdge { scene, ray, medium, edge, point, extinction_back, throughput, index };
-            let arrival = flying.fly(kind, tracer, sampler, hooks);
-            medium = flying.medium;
+        let mut next =
+            NextEdge { scene, ray, medium, edge: &mut edge, point: &mut point, extinction_back, throughput, index };
+        let arrival = if MEDIA {
+            let arrival = next.fly(kind, tracer, sampler, hooks);
+            medium = next.medium;
             throughput *= edge.flight.throughput();
             arrival
         } else {
-            match tracer.closest(&ray, kind) {
-                None => Arrival::Escaped,
-                Some(hit) => {
-                    edge.distance = hit.t;
-                    let material = scene.surface_point_into(&hit, &mut point);
-                    if has_masks {
-                        let mut passage = Passage { scene, ray, edge: &mut edge, hit, point: &mut point };
-                        let passed = |passage: &Passage| passage.show_emission(index, throughput, hooks);
-                        match passage.go_on(material, kind, tracer, sampler.rng(), passed) {
-                            None => Arrival::Escaped,
-                            Some((hit, material)) => Arrival::Surface(hit, material),
-                        }
-                    } else {
-                        Arrival::Surface(hit, material)
-                    }
-                }
-            }
+            next.meet(has_masks, kind, tracer, sampler, hooks)
         };
         let (hit, medium_point);
         let (place, media) = match arrival {
@@ -156,7 +169,7 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
             Arrival::Surface(met, material) => {
                 hit = met;
                 material.resolve_into(&mut bsdf, &point, wo);
-                let media = if has_media { scene.media_beside(&hit, medium) } else { [MediumNumber::VACUUM; 2] };
+                let media = if MEDIA { scene.media_beside(&hit, medium) } else { [MediumNumber::VACUUM; 2] };
                 (Place::Surface { point: &point, hit: &hit }, media)
             }
             Arrival::Collided(met) => {
@@ -183,11 +196,11 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
             return;
         }
         hooks.leaving(&vertex, &sample);
-        if has_media {
+        if MEDIA {
             medium = vertex.medium_towards(sample.wi);
+            extinction_back = vertex.place.extinction();
         }
         let end = vertex.place.segment_end();
-        extinction_back = vertex.place.extinction();
         edge = Edge { delta: sample.delta, survival, ..Edge::new(p, sample.pdf) };
         (o, d) = (end.leaving(sample.wi), sample.wi);
         (t_min, t_max) = (T_MIN, f32::INFINITY);

@@ -299,7 +299,7 @@ impl<'a> Gather<'a> {
         };
         let replay_index = self.record((1, vertex.index as usize + 1), direct.raw, weight, false);
         let queued = QueuedLight { pixel: self.pixel, replay_index, raw: direct.raw, weight };
-        let queued = queued.along(&flight, self.rules.heuristic);
+        let queued = if flight.is_free() { queued } else { queued.along(&flight, self.rules.heuristic) };
         let (samples, replay, heuristic) = (&mut *self.samples, &mut self.replay, self.rules.heuristic);
         self.queue.push(&segment, queued, tracer, |light, transmittance| {
             light.through(transmittance, heuristic).arrive(samples, replay.as_deref_mut());
@@ -348,7 +348,8 @@ impl<'a> Gather<'a> {
 }
 
 impl WalkHooks for Gather<'_> {
-    #[inline]
+    // Walks with and without media are two places that call it.
+    #[inline(always)]
     fn vertex(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
         let (scene, index) = (self.scene, vertex.index);
         if let Some(replay) = &mut self.replay {
