@@ -16,7 +16,7 @@ pub fn light_choice_normal(scene: &PreparedScene, vertex: &Vertex) -> Option<Vec
 
 /// Draws a light and a point of it as seen from `vertex`, whose light choice normal is `normal`, and hands them over
 /// with the probability of the light.
-#[inline]
+#[inline(always)]
 pub fn sample_direct(
     scene: &PreparedScene,
     vertex: &Vertex,

@@ -190,6 +190,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
     }
 
     /// (1, t): a point of a light, drawn as seen from the eye vertex.
+    #[inline(always)]
     fn next_event(&mut self, vertex: &Vertex, normal: Option<Vec3>, tracer: &mut Tracer, sampler: &mut PathSampler) {
         let scene = self.rules.iteration.scene;
         sample_direct(scene, vertex, normal, sampler, |id, pmf, sample| {
@@ -311,6 +312,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
     }
 
     /// Connections of a vertex to light sub-paths.
+    #[inline(always)]
     fn connections(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) {
         let (t, rules) = (vertex.index as usize + 1, self.rules);
         let (techniques, max_edges) = (&rules.mis.techniques, u64::from(rules.mis.eye_limits.max_edges));
