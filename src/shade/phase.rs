@@ -5,7 +5,6 @@
 //! and `wi`, and sampled exactly: the density of a direction is p itself. The scattering function of the point is σ_s p,
 //! for radiance and importance alike.
 
-use super::BsdfSample;
 use crate::math::{Frame, Rgb, SolidAnglePdf, Vec3};
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -131,22 +130,6 @@ impl PhaseScattering {
     pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, SolidAnglePdf) {
         let p = self.phase.eval(wo, wi);
         (self.sigma_s * p, SolidAnglePdf(p))
-    }
-
-    /// Draws a direction; `u` = [lobe, cosine, azimuth].
-    #[inline]
-    pub fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        let wi = self.phase.sample(wo, u);
-        let (value, pdf) = self.eval_and_pdf(wo, wi);
-        (pdf.0 > 0.0).then_some(BsdfSample {
-            wi,
-            value,
-            pdf,
-            pdf_reverse_delta: SolidAnglePdf(0.0),
-            reverse_delta: Rgb::BLACK,
-            delta: false,
-            eta: 1.0,
-        })
     }
 }
 

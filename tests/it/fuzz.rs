@@ -251,23 +251,19 @@ fn fuzz((name, read): Reader, seed: u64, go_on: impl Fn(u64) -> bool) -> u64 {
     done
 }
 
+/// 400 files for each reader, or as many as FUZZ_SECONDS allow for each if that is set, with a seed of the clock.
 #[test]
 fn readers_survive_mutated_files() {
+    let seconds: Option<u64> = std::env::var("FUZZ_SECONDS").ok().and_then(|s| s.parse().ok());
+    let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs();
     for reader in READERS {
-        let files = if reader.0 == "checkpoint" { 60 } else { 400 };
-        fuzz(reader, 1, |done| done < files);
-    }
-}
-
-/// Each reader for FUZZ_SECONDS (20 if that is not set), with a seed of the clock.
-#[test]
-#[ignore = "a long run by hand; the bounded one is readers_survive_mutated_files"]
-fn long_run() {
-    let seconds = std::env::var("FUZZ_SECONDS").ok().and_then(|s| s.parse().ok()).unwrap_or(20);
-    let seed = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs();
-    for reader in READERS {
-        let start = Instant::now();
-        let files = fuzz(reader, seed, |_| start.elapsed() < Duration::from_secs(seconds));
-        println!("{}: {files} files in {:.0} s", reader.0, start.elapsed().as_secs_f64());
+        let (start, files) = (Instant::now(), if reader.0 == "checkpoint" { 60 } else { 400 });
+        match seconds {
+            None => assert_eq!(fuzz(reader, 1, |done| done < files), files),
+            Some(seconds) => {
+                let files = fuzz(reader, clock, |_| start.elapsed() < Duration::from_secs(seconds));
+                println!("{}: {files} files in {:.0} s", reader.0, start.elapsed().as_secs_f64());
+            }
+        }
     }
 }

@@ -54,17 +54,11 @@ fn kill(kills: u64) -> [u64; 2] {
     [killed, resumed]
 }
 
+/// Each integrator is killed 3 times, or as often as KILLS says.
 #[test]
 fn killed_renders_go_on_bit_by_bit() {
-    let [killed, _] = kill(3);
-    assert!(killed > 0);
-}
-
-/// The long version, for `cargo test -- --ignored`.
-#[test]
-#[ignore = "a long run by hand; the bounded one is killed_renders_go_on_bit_by_bit"]
-fn a_hundred_kills_lose_nothing() {
-    let [killed, resumed] = kill(12);
+    let times = std::env::var("KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(3);
+    let [killed, resumed] = kill(times);
     println!("{killed} renders were killed; {resumed} began from a checkpoint");
-    assert!(killed >= 100, "{killed} kills");
+    assert!(killed > 0);
 }

@@ -1,9 +1,9 @@
 //! Light through masks and `null` interfaces, in every method: values known by hand, pictures without the surfaces, and
 //! weights.
 
-use crate::support::methods::{bidirectional_methods, declared, for_small_scenes};
+use crate::support::methods::{bidirectional_methods, weight_variant};
 use crate::support::pictures::{Picture, parse, prepare, takes, unbiased};
-use lightsieve::integrators::{IntegratorSpec, Iteration, Params, importance, path};
+use lightsieve::integrators::{IntegratorSpec, Iteration, importance, path};
 use lightsieve::math::sampler::PathSampler;
 use lightsieve::path::first_seen;
 use lightsieve::prepared::{Features, PreparedScene};
@@ -197,17 +197,7 @@ fn weights_count_the_masks_on_every_edge() {
     for spec in bidirectional_methods() {
         let (mut checked, mut connections) = (0, 0);
         for variant in 0..6 {
-            let mut params = Params::defaults(spec);
-            let common = [("fallback", "false"), ("rr_depth", ["5", "1", "2"][variant % 3])];
-            let heuristic = [("heuristic", ["balance", "power"][variant % 2])];
-            for (name, value) in for_small_scenes(spec, variant)
-                .into_iter()
-                .chain(declared(spec, &common))
-                .chain(declared(spec, &heuristic))
-            {
-                params.set(name, value).unwrap();
-            }
-            let mut integrator = (spec.build)(&params);
+            let mut integrator = (spec.build)(&weight_variant(spec, variant));
             // Few light sub-paths meet what the camera sees, and other methods find more paths from each pixel.
             let iterations = if spec.name == "light" { 100 } else { 8 };
             for c in (0..16 * iterations).flat_map(|i| {

@@ -1,9 +1,9 @@
 //! Participating media, in every method: values known by hand, agreement of methods with each other and with Mitsuba, and
 //! weights.
 
-use crate::support::methods::{bidirectional_methods, declared, for_small_scenes};
+use crate::support::methods::{bidirectional_methods, weight_variant};
 use crate::support::pictures::{Picture, parse_beside, prepare, takes, unbiased};
-use lightsieve::integrators::{IntegratorSpec, Iteration, Params, find, path};
+use lightsieve::integrators::{IntegratorSpec, Iteration, find, path};
 use lightsieve::prepared::{Features, PreparedScene};
 use lightsieve::ray::Backend;
 
@@ -224,17 +224,7 @@ fn weights_count_collisions_and_media_on_every_edge() {
         let (mut checked, mut connections) = (0, 0);
         for (what, scene) in &scenes {
             for variant in 0..2 {
-                let mut params = Params::defaults(spec);
-                let common = [("fallback", "false"), ("rr_depth", ["5", "1", "2"][variant % 3])];
-                let heuristic = [("heuristic", ["balance", "power"][variant % 2])];
-                for (name, value) in for_small_scenes(spec, variant)
-                    .into_iter()
-                    .chain(declared(spec, &common))
-                    .chain(declared(spec, &heuristic))
-                {
-                    params.set(name, value).unwrap();
-                }
-                let mut integrator = (spec.build)(&params);
+                let mut integrator = (spec.build)(&weight_variant(spec, variant));
                 let contributions = (0..16 * 6).flat_map(|i| {
                     let pixel = (i % 4, i / 4 % 4);
                     integrator.replay(&Iteration::new(scene, 7, u64::from(i / 16)), pixel).contributions

@@ -171,7 +171,7 @@ impl BsdfView<'_> {
         match self.scattering {
             Scattering::Lambertian(lambert) => self.smooth_sample(wo, lambert.sample_direction(u), 1.0, mode),
             Scattering::Lobes(sum) => self.sample_lobes(sum, wo, u, mode),
-            Scattering::Phase(phase) => phase.sample(wo, u),
+            Scattering::Phase(phase) => self.smooth_sample(wo, phase.phase.sample(wo, u), 1.0, mode),
         }
     }
 

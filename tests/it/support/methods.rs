@@ -33,6 +33,20 @@ pub fn for_small_scenes(spec: &IntegratorSpec, variant: usize) -> Vec<(&'static 
     declared(spec, &all).collect()
 }
 
+/// Parameters for tests of weights in small scenes, with other choices, roulette and heuristic as `variant` counts up.
+pub fn weight_variant(spec: &'static IntegratorSpec, variant: usize) -> Params {
+    let mut params = Params::defaults(spec);
+    let common = [
+        ("fallback", "false"),
+        ("rr_depth", ["5", "1", "2"][variant % 3]),
+        ("heuristic", ["balance", "power"][variant % 2]),
+    ];
+    for (name, value) in for_small_scenes(spec, variant).into_iter().chain(declared(spec, &common)) {
+        params.set(name, value).unwrap();
+    }
+    params
+}
+
 /// The values whose parameters a method has.
 pub fn declared<'a, 's>(
     spec: &'s IntegratorSpec,
