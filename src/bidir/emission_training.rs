@@ -6,11 +6,13 @@
 //! surface, has found a whole path, and with it the path's first ray from the light. Light that the camera sees after
 //! one scattering event is found by next event anyway and does not count.
 
-use super::endpoint::{DirectLight, emitted_at, for_each_background, light_choice_normal, sample_direct};
+use super::endpoint::{
+    DirectLight, DirectSampleSink, emitted_at, for_each_background, light_choice_normal, sample_direct,
+};
 use super::warm_up::WarmUp;
-use crate::emit::{EmissionDistribution, EmissionRecord, LightId};
+use crate::emit::{DirectSample, EmissionDistribution, EmissionRecord, LightId};
 use crate::math::sampler::PathSampler;
-use crate::math::{Rgb, Vec3};
+use crate::math::{Pmf, Rgb, Vec3};
 use crate::path::{
     Edge, PathLimits, ScatterSampler, ShadowQueue, Vertex, WalkHooks, WalkRules, WalkStart, direct_segment, streams,
     walk,
@@ -86,6 +88,27 @@ impl<'a> Training<'a> {
     }
 }
 
+/// Next event at a vertex.
+struct NextEvent<'a, 'g, 't> {
+    training: &'a mut Training<'g>,
+    vertex: &'a Vertex<'a>,
+    tracer: &'a mut Tracer<'t>,
+}
+
+impl DirectSampleSink for NextEvent<'_, '_, '_> {
+    fn accept(&mut self, light: LightId, pmf: Pmf, sample: &DirectSample) {
+        let vertex = self.vertex;
+        let Some(direct) = DirectLight::new(vertex, &ScatterSampler, sample, pmf) else { return };
+        let weight = f64::from(direct.raw.luminance());
+        let record = EmissionRecord { light, p: vertex.position(), direction: -sample.wi, weight };
+        let segment = direct_segment(&vertex.place.segment_end(), sample);
+        let Training { records, queue, .. } = &mut *self.training;
+        queue.push(&segment, Some(record), self.tracer, |record, transmittance| {
+            Training::arrive(records, record, transmittance);
+        });
+    }
+}
+
 impl WalkHooks for Training<'_> {
     fn vertex(&mut self, vertex: &Vertex, tracer: &mut Tracer, sampler: &mut PathSampler) -> bool {
         let scene = self.scene;
@@ -97,16 +120,7 @@ impl WalkHooks for Training<'_> {
         }
         if vertex.index >= self.first_vertex && vertex.scatter.connectable() {
             let normal = light_choice_normal(scene, vertex);
-            sample_direct(scene, vertex, normal, sampler, |light, pmf, sample| {
-                let Some(direct) = DirectLight::new(vertex, &ScatterSampler, sample, pmf) else { return };
-                let weight = f64::from(direct.raw.luminance());
-                let record = EmissionRecord { light, p: vertex.position(), direction: -sample.wi, weight };
-                let segment = direct_segment(&vertex.place.segment_end(), sample);
-                let records = &mut self.records;
-                self.queue.push(&segment, Some(record), tracer, |record, transmittance| {
-                    Training::arrive(records, record, transmittance);
-                });
-            });
+            sample_direct(scene, vertex, normal, sampler, &mut NextEvent { training: self, vertex, tracer });
         }
         true
     }

@@ -14,6 +14,14 @@ pub fn light_choice_normal(scene: &PreparedScene, vertex: &Vertex) -> Option<Vec
     if scene.lights.uses_light_tree() { vertex.light_choice_normal() } else { None }
 }
 
+/// Uses the samples of next event.
+///
+/// A method can be inlined everywhere by force, a closure cannot, and the walk's code stands at several places.
+pub trait DirectSampleSink {
+    /// Takes the sample, which was drawn from the light `id` of probability `pmf`.
+    fn accept(&mut self, id: LightId, pmf: Pmf, sample: &DirectSample);
+}
+
 /// Draws a light and a point of it as seen from `vertex`, whose light choice normal is `normal`, and hands them over
 /// with the probability of the light.
 #[inline(always)]
@@ -22,7 +30,7 @@ pub fn sample_direct(
     vertex: &Vertex,
     normal: Option<Vec3>,
     sampler: &mut PathSampler,
-    mut drawn: impl FnMut(LightId, Pmf, &DirectSample),
+    sink: &mut impl DirectSampleSink,
 ) {
     let u = sampler.vertex(vertex.index, SampleSlot::Emitter);
     let p = vertex.position();
@@ -32,12 +40,12 @@ pub fn sample_direct(
     match scene.lights.get(id) {
         Light::Triangle(light) => {
             if let Some(sample) = light.sample_direct(p, [u[1], u[2]]) {
-                drawn(id, pmf, &sample);
+                sink.accept(id, pmf, &sample);
             }
         }
         light => {
             if let Some(sample) = light.sample_direct(p, [u[1], u[2]]) {
-                drawn(id, pmf, &sample);
+                sink.accept(id, pmf, &sample);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::contribution::{Contribution, ContributionKind};
 use super::endpoint::{
-    DirectLight, emitted_at, for_each_background, light_choice_normal, next_event_pdf, sample_direct,
+    DirectLight, DirectSampleSink, emitted_at, for_each_background, light_choice_normal, next_event_pdf, sample_direct,
 };
 use super::light_subpath::LightSubpath;
 use super::replay::{ContributionRecord, Replay, SubpathKind};
@@ -65,6 +65,20 @@ pub(super) struct EyeHooks<'a, S: ConnectionStrategy, K> {
     pub queues: &'a mut EyeQueues,
     pub sink: &'a mut K,
     pub replay: Option<&'a mut Replay>,
+}
+
+/// Next event at an eye vertex.
+struct NextEvent<'a, 'h, 't, S: ConnectionStrategy, K> {
+    hooks: &'a mut EyeHooks<'h, S, K>,
+    vertex: &'a Vertex<'a>,
+    tracer: &'a mut Tracer<'t>,
+}
+
+impl<S: ConnectionStrategy, K: ContributionSink> DirectSampleSink for NextEvent<'_, '_, '_, S, K> {
+    #[inline(always)]
+    fn accept(&mut self, id: LightId, pmf: Pmf, sample: &DirectSample) {
+        self.hooks.direct(self.vertex, id, pmf, sample, self.tracer);
+    }
 }
 
 /// The light's end of a path that a contribution belongs to.
@@ -193,9 +207,7 @@ impl<S: ConnectionStrategy, K: ContributionSink> EyeHooks<'_, S, K> {
     #[inline(always)]
     fn next_event(&mut self, vertex: &Vertex, normal: Option<Vec3>, tracer: &mut Tracer, sampler: &mut PathSampler) {
         let scene = self.rules.iteration.scene;
-        sample_direct(scene, vertex, normal, sampler, |id, pmf, sample| {
-            self.direct(vertex, id, pmf, sample, tracer);
-        });
+        sample_direct(scene, vertex, normal, sampler, &mut NextEvent { hooks: self, vertex, tracer });
     }
 
     /// Queues the light of `sample`, which was drawn from the light `id` of probability `pmf`.

@@ -32,17 +32,17 @@ pub trait DirectionSampler: Sync {
 pub struct ScatterSampler;
 
 impl DirectionSampler for ScatterSampler {
-    #[inline]
+    #[inline(always)]
     fn sample(&self, _p: Vec3, scatter: &Scatter, wo: Vec3, u: [f32; 3], mode: Transport) -> Option<BsdfSample> {
         scatter.sample(wo, u, mode)
     }
 
-    #[inline]
+    #[inline(always)]
     fn pdf(&self, _p: Vec3, scatter: &impl Scattering, wo: Vec3, wi: Vec3, mode: Transport) -> SolidAnglePdf {
         scatter.pdf(wo, wi, mode)
     }
 
-    #[inline]
+    #[inline(always)]
     fn eval_and_pdf(
         &self,
         _p: Vec3,

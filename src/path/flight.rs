@@ -173,21 +173,21 @@ impl<'s> NextEdge<'s, '_> {
     /// passes is shown to the hooks.
     #[inline(always)]
     pub fn meet(
-        &mut self,
+        self,
         has_masks: bool,
         kind: RayKind,
         tracer: &mut Tracer,
         sampler: &mut PathSampler,
         hooks: &mut impl WalkHooks,
     ) -> Arrival<'s> {
-        let NextEdge { scene, ray, index, throughput, .. } = *self;
+        let NextEdge { scene, ray, edge, point, index, throughput, .. } = self;
         let Some(hit) = tracer.closest(&ray, kind) else { return Arrival::Escaped };
-        self.edge.distance = hit.t;
-        let material = scene.surface_point_into(&hit, self.point);
+        edge.distance = hit.t;
+        let material = scene.surface_point_into(&hit, point);
         if !has_masks {
             return Arrival::Surface(hit, material);
         }
-        let mut passage = Passage { scene, ray, edge: self.edge, hit, point: self.point };
+        let mut passage = Passage { scene, ray, edge, hit, point };
         let passed = |passage: &Passage| passage.show_emission(index, throughput, hooks);
         match passage.go_on(material, kind, tracer, sampler.rng(), passed) {
             Some((hit, material)) => Arrival::Surface(hit, material),
@@ -222,8 +222,8 @@ impl<'s> NextEdge<'s, '_> {
                     }
                 }
             }
-            self.arrive(depth, holes, None);
             let Some(hit) = hit else {
+                self.arrive(depth, holes, None);
                 self.edge.distance = f32::INFINITY;
                 return Arrival::Escaped;
             };
@@ -232,12 +232,16 @@ impl<'s> NextEdge<'s, '_> {
             let through = if material.features().passes_through { material.holes(self.point) } else { 0.0 };
             // Numbers in [0, 1) are below one, and none is below zero.
             if through <= 0.0 || through < 1.0 && sampler.rng().next_f32() >= through {
+                self.arrive(depth, holes, None);
                 return Arrival::Surface(hit, material);
             }
-            let throughput = self.throughput * self.edge.flight.throughput();
             let (scene, ray) = (self.scene, self.ray);
-            Passage { scene, ray, edge: self.edge, hit, point: self.point }
-                .show_emission(self.index, throughput, hooks);
+            if scene.light_of(&hit).is_some() {
+                self.arrive(depth, holes, None);
+                let throughput = self.throughput * self.edge.flight.throughput();
+                Passage { scene, ray, edge: self.edge, hit, point: self.point }
+                    .show_emission(self.index, throughput, hooks);
+            }
             holes *= through;
             let SurfacePoint { p, error, ng, .. } = *self.point;
             self.medium = scene.medium_beside(&hit, ng.dot(ray.d)).unwrap_or(self.medium);

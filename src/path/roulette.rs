@@ -35,7 +35,7 @@ impl PathLimits {
     }
 
     /// Probability to go on after a vertex with the scattering function `scatter` where roulette is played.
-    #[inline]
+    #[inline(always)]
     pub fn roulette_survival(&self, scatter: &Scatter) -> f32 {
         let survival = survival(scatter.albedo());
         if self.rr_scale < 1.0 && scatter.is_lambertian() { survival * self.rr_scale } else { survival }

@@ -162,7 +162,10 @@ impl Place<'_> {
     /// Position.
     #[inline]
     pub fn position(&self) -> Vec3 {
-        self.stored().position()
+        match self {
+            Place::Surface { point, .. } => point.p,
+            Place::Medium(medium) => medium.p,
+        }
     }
 
     /// Unit geometric normal; zero in a medium.
@@ -186,19 +189,25 @@ impl Place<'_> {
     /// See [`StoredPlace::cosine`].
     #[inline]
     pub fn cosine(&self, d: Vec3) -> f32 {
-        self.stored().cosine(d)
+        match self {
+            Place::Surface { point, .. } => point.ng.dot(d),
+            Place::Medium(_) => 1.0,
+        }
     }
 
     /// See [`StoredPlace::area_jacobian`].
     #[inline]
     pub fn area_jacobian(&self, d: Vec3, distance2: f32) -> f32 {
-        self.stored().area_jacobian(d, distance2)
+        area_jacobian(self.cosine(d), distance2)
     }
 
     /// This end of a segment.
     #[inline]
     pub fn segment_end(&self) -> SegmentEnd {
-        self.stored().segment_end()
+        match self {
+            Place::Surface { point, .. } => SegmentEnd::Surface { p: point.p, error: point.error, ng: point.ng },
+            Place::Medium(medium) => SegmentEnd::Free(medium.p),
+        }
     }
 }
 

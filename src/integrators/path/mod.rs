@@ -11,7 +11,7 @@
 use super::params::shared::{HIDE_EMITTERS, MAX_DEPTH, RR_DEPTH_UNIDIRECTIONAL, heuristic};
 use super::{Integrator, IntegratorSpec, Iteration, ParamDefault, Params};
 use crate::bidir::endpoint::{
-    DirectLight, emitted_at, for_each_background, light_choice_normal, next_event_pdf, sample_direct,
+    DirectLight, DirectSampleSink, emitted_at, for_each_background, light_choice_normal, next_event_pdf, sample_direct,
 };
 use crate::bidir::replay::{ContributionRecord, Replay, SubpathKind};
 use crate::emit::{DirectSample, LightId};
@@ -347,6 +347,20 @@ impl<'a> Gather<'a> {
     }
 }
 
+/// Next event at a vertex.
+struct NextEvent<'a, 'g, 't> {
+    gather: &'a mut Gather<'g>,
+    vertex: &'a Vertex<'a>,
+    tracer: &'a mut Tracer<'t>,
+}
+
+impl DirectSampleSink for NextEvent<'_, '_, '_> {
+    #[inline(always)]
+    fn accept(&mut self, _id: LightId, pmf: Pmf, sample: &DirectSample) {
+        self.gather.next_event(self.vertex, sample, pmf, self.tracer);
+    }
+}
+
 impl WalkHooks for Gather<'_> {
     // Walks with and without media are two places that call it.
     #[inline(always)]
@@ -362,9 +376,7 @@ impl WalkHooks for Gather<'_> {
         let normal = light_choice_normal(scene, vertex);
         self.normal_before = normal;
         if index < self.rules.limits.max_edges && vertex.scatter.connectable() {
-            sample_direct(scene, vertex, normal, sampler, |_, pmf, sample| {
-                self.next_event(vertex, sample, pmf, tracer);
-            });
+            sample_direct(scene, vertex, normal, sampler, &mut NextEvent { gather: self, vertex, tracer });
         }
         true
     }
