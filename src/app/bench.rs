@@ -4,7 +4,7 @@ use super::Failure;
 use super::measure_args::BenchArgs;
 use super::session::{SceneMethods, Session, to_json};
 use crate::image::{atomic_write, read_regular_text};
-use crate::measure::bench::{Baseline, Change, Row, Table as Measured, Verdict, against, calibrate};
+use crate::measure::bench::{Baseline, Change, Judged, Row, Table as Measured, Verdict, against, calibrate};
 use crate::measure::converge::{EqualTimeTask, converge};
 use crate::measure::curve::runs_of;
 use crate::measure::report::Table;
@@ -42,7 +42,11 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     }
     let measured =
         Measured { machine: Machine::here(session.environment.threads, backend), load: watch.finish(), rows };
-    let verdicts = baseline.as_ref().map(|old| against(&old.rows, &measured.rows));
+    let judged = match (&baseline, args.allow_busy) {
+        (Some(old), false) => Judged::under([old.load.as_ref(), Some(&measured.load)]),
+        _ => Judged::All,
+    };
+    let verdicts = baseline.as_ref().map(|old| against(&old.rows, &measured.rows, judged));
     if args.measure.json {
         out!("{}", to_json(&Answer { measured: &measured, against: verdicts.as_deref() })?);
     } else {
@@ -50,7 +54,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     }
     session.say(&measured.load.sentence());
     if let Some(warning) = measured.load.warning() {
-        note!("warning: {warning}{}", if verdicts.is_some() { ", and so do verdicts on them" } else { "" });
+        note!("warning: {warning}");
     }
     if let Some(path) = &args.save {
         let text = to_json(&measured)?;
@@ -63,6 +67,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         (Some(v), _) if v.is_empty() => {
             Err(Failure::Input("the baseline has none of these scenes and methods: nothing was compared".into()))
         }
+        (Some(_), 0) if judged == Judged::Errors => Err(Failure::NotJudged),
         (_, 0) => Ok(()),
         (_, n) => Err(Failure::Regression(n)),
     }
@@ -136,15 +141,13 @@ fn print(rows: &[Row], verdicts: Option<&[Verdict]>) {
         ];
         let verdict = verdicts.into_iter().flatten().find(|v| v.scene == row.scene && v.method == row.method);
         if let Some(v) = verdict {
-            cells.push(format!("x {:.3}", v.time.ratio));
             let ratio = |change: Option<Change>| change.map_or("–".into(), |e| format!("x {:.3}", e.ratio));
-            cells.extend([ratio(v.error), ratio(v.block_error)]);
-            let slower = v.time.regression.then(|| format!("slower (bound {:.3})", v.time.bound));
-            let worse = |change: Option<Change>, what: &str| {
+            cells.extend([v.time, v.error, v.block_error].map(ratio));
+            let worse = |(change, what): (Option<Change>, &str)| {
                 change.filter(|e| e.regression).map(|e| format!("{what} (bound {:.3})", e.bound))
             };
-            let worse = worse(v.error, "worse").into_iter().chain(worse(v.block_error, "blocks worse"));
-            cells.push(slower.into_iter().chain(worse).collect::<Vec<_>>().join(", "));
+            let changes = [(v.time, "slower"), (v.error, "worse"), (v.block_error, "blocks worse")];
+            cells.push(changes.into_iter().filter_map(worse).collect::<Vec<_>>().join(", "));
         }
         table.row(cells);
     }

@@ -142,6 +142,9 @@ pub(crate) struct BenchArgs {
     /// Earlier measurements to compare with; it is a failure (exit code 1) if something is worse beyond noise
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
+    /// Judge times even if other programs used the processors during one of the measurements
+    #[arg(long, requires = "against")]
+    pub allow_busy: bool,
     /// Write the measurements, for a later --against
     #[arg(long, value_name = "FILE")]
     pub save: Option<PathBuf>,

@@ -51,6 +51,8 @@ pub(crate) enum Failure {
     NonFinite(u64),
     /// `bench --against`: so many rows are worse than they were.
     Regression(usize),
+    /// `bench --against`: other programs used the processors, and nothing but errors was judged.
+    NotJudged,
     /// `--require-error-target`: the estimated error is not below the target.
     Target,
     /// Ctrl-C; everything was written.
@@ -73,6 +75,10 @@ impl Failure {
             Failure::Input(text) | Failure::Io(text) => note!("error: {text}"),
             Failure::NonFinite(n) => note!("error: {n} samples were not finite (--strict)"),
             Failure::Regression(n) => note!("error: worse than the baseline beyond noise: {n} rows"),
+            Failure::NotJudged => note!(
+                "error: other programs used the processors: errors are no worse than the baseline's, times were not \
+                 judged; measure on a quiet machine, or use --allow-busy"
+            ),
             Failure::Target => note!("error: the error target was not reached (--require-error-target)"),
             Failure::Interrupted => note!("interrupted"),
         }
@@ -80,7 +86,7 @@ impl Failure {
 
     fn exit_code(&self) -> u8 {
         match self {
-            Failure::NonFinite(_) | Failure::Regression(_) | Failure::Target => 1,
+            Failure::NonFinite(_) | Failure::Regression(_) | Failure::NotJudged | Failure::Target => 1,
             Failure::Input(_) => 2,
             Failure::Io(_) => 3,
             Failure::Interrupted => 130,

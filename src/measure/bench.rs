@@ -51,11 +51,33 @@ pub struct Table {
     pub rows: Vec<Row>,
 }
 
-/// Earlier measurements, of which only the rows are compared.
+/// Earlier measurements.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Baseline {
+    /// Load of the machine by other programs; absent in earlier measurements.
+    #[serde(default)]
+    pub load: Option<Load>,
     /// Rows.
     pub rows: Vec<Row>,
+}
+
+/// Which numbers two measurements are judged by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judged {
+    /// Times and errors.
+    All,
+    /// Errors alone: other programs used the processors during one of the measurements.
+    Errors,
+}
+
+impl Judged {
+    /// What measurements under these loads can be judged by.
+    pub fn under(loads: [Option<&Load>; 2]) -> Judged {
+        match loads.into_iter().flatten().any(|load| load.disturbance().is_some()) {
+            true => Judged::Errors,
+            false => Judged::All,
+        }
+    }
 }
 
 /// A change of one number.
@@ -76,8 +98,8 @@ pub struct Verdict {
     pub scene: String,
     /// Method.
     pub method: String,
-    /// Seconds per iteration.
-    pub time: Change,
+    /// Seconds per iteration; none if times are not judged.
+    pub time: Option<Change>,
     /// Error at equal samples; none if there are no equal numbers of samples.
     pub error: Option<Change>,
     /// Error of 16 × 16 blocks at equal samples; none if one of the measurements has none.
@@ -143,12 +165,12 @@ fn error_change(old: &[(u64, Vec<f64>)], new: &[(u64, Vec<f64>)]) -> Option<Chan
 impl Verdict {
     /// Something became worse.
     pub fn is_worse(&self) -> bool {
-        self.time.regression || [self.error, self.block_error].into_iter().flatten().any(|e| e.regression)
+        [self.time, self.error, self.block_error].into_iter().flatten().any(|e| e.regression)
     }
 }
 
 /// Compares every row that both measurements have.
-pub fn against(old: &[Row], new: &[Row]) -> Vec<Verdict> {
+pub fn against(old: &[Row], new: &[Row], judged: Judged) -> Vec<Verdict> {
     let pair = |row: &Row| {
         let before = old.iter().find(|r| r.scene == row.scene && r.method == row.method)?;
         let time = |r: &Row| {
@@ -158,7 +180,7 @@ pub fn against(old: &[Row], new: &[Row]) -> Vec<Verdict> {
         Some(Verdict {
             scene: row.scene.clone(),
             method: row.method.clone(),
-            time: change(time(before), time(row), TIME_TOLERANCE),
+            time: (judged == Judged::All).then(|| change(time(before), time(row), TIME_TOLERANCE)),
             error: error_change(&before.errors, &row.errors),
             block_error: error_change(&before.block_errors, &row.block_errors),
         })
@@ -198,10 +220,13 @@ mod tests {
     fn changes_beyond_noise_are_found() {
         let old = row([1.0, 1.01, 0.99], 10.0, [0.5, 0.51, 0.49]);
         let verdict = |new: Row| {
-            let v = against(std::slice::from_ref(&old), &[new]).pop().unwrap();
-            assert_eq!(v.error.unwrap().regression, v.block_error.unwrap().regression);
-            assert_eq!(v.is_worse(), v.time.regression || v.error.unwrap().regression);
-            (v.time.regression, v.error.unwrap().regression)
+            let judge = |judged| against(std::slice::from_ref(&old), std::slice::from_ref(&new), judged).pop().unwrap();
+            let (v, errors) = (judge(Judged::All), judge(Judged::Errors));
+            let (time, error) = (v.time.unwrap().regression, v.error.unwrap().regression);
+            assert_eq!(error, v.block_error.unwrap().regression);
+            assert_eq!(v.is_worse(), time || error);
+            assert!(errors.time.is_none() && errors.is_worse() == error);
+            (time, error)
         };
         assert_eq!(verdict(old.clone()), (false, false));
         assert_eq!(verdict(row([1.3, 1.31, 1.29], 10.0, [0.5, 0.51, 0.49])), (true, false));
@@ -210,6 +235,16 @@ mod tests {
         // Times like these tell nothing.
         assert_eq!(verdict(row([1.0, 1.9, 0.9], 10.0, [0.5, 0.51, 0.49])), (false, false));
         assert_eq!(verdict(row([1.0, 1.01, 0.99], 10.0, [0.8, 0.81, 0.79])), (false, true));
-        assert!(against(&[], &[old]).is_empty());
+        assert!(against(&[], &[old], Judged::All).is_empty());
+    }
+
+    #[test]
+    fn times_of_a_machine_in_use_are_not_judged() {
+        let load = |others: f64| Load { seconds: 1.0, average_before: None, average_after: None, others: Some(others) };
+        let (quiet, busy) = (load(0.04), load(0.06));
+        assert_eq!(Judged::under([Some(&quiet), Some(&quiet)]), Judged::All);
+        assert_eq!(Judged::under([None, Some(&quiet)]), Judged::All);
+        assert_eq!(Judged::under([Some(&busy), Some(&quiet)]), Judged::Errors);
+        assert_eq!(Judged::under([None, Some(&busy)]), Judged::Errors);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::report::Table;
 use crate::render::stats::cpu_seconds;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// The machine and the program.
@@ -64,7 +64,7 @@ impl Machine {
 }
 
 /// How busy the machine was, where the system tells (Linux).
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Load {
     /// Seconds watched.
     pub seconds: f64,
@@ -110,13 +110,15 @@ impl LoadWatch {
 const DISTURBING: f64 = 0.05;
 
 impl Load {
+    /// The share that other processes took, if it is so large that measured times say little.
+    pub fn disturbance(&self) -> Option<f64> {
+        self.others.filter(|share| *share > DISTURBING)
+    }
+
     /// A warning if other processes took so much processor time that measured times say little.
     pub fn warning(&self) -> Option<String> {
-        let others = self.others.filter(|share| *share > DISTURBING)?;
-        Some(format!(
-            "other programs took {:.0} % of the processors: times of this measurement say little",
-            100.0 * others
-        ))
+        let percent = 100.0 * self.disturbance()?;
+        Some(format!("other programs took {percent:.0} % of the processors: times of this measurement say little"))
     }
 
     /// As a sentence.

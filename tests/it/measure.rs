@@ -343,14 +343,23 @@ fn a_bench_finds_what_is_worse() {
     };
     scaled("fast.json", 0.01);
     scaled("slow.json", 100.0);
-    let worse: Run = bench("--against fast.json").expect(1, &["worse than the baseline", "2 rows"]);
+    let worse: Run = bench("--against fast.json --allow-busy").expect(1, &["worse than the baseline", "2 rows"]);
     assert!(worse.stdout.contains("slower (bound"), "{}", worse.stdout);
-    let better = json(&bench("--against slow.json --json").expect(0, &[]).stdout);
+    let better = json(&bench("--against slow.json --allow-busy --json").expect(0, &[]).stdout);
     for verdict in better["against"].as_array().unwrap() {
         assert!(number(&verdict["time"]["ratio"]) < 0.5, "{verdict}");
         // Equal seeds make equal pictures.
         assert!((number(&verdict["error"]["ratio"]) - 1.0).abs() < 1e-9, "{verdict}");
     }
+    // A baseline of a machine in use.
+    let mut busy = base.clone();
+    busy["load"]["others"] = 0.5.into();
+    sandbox.write("busy.json", busy.to_string());
+    let refused = bench("--against busy.json --json").expect(1, &["times were not judged", "--allow-busy"]);
+    for verdict in json(&refused.stdout)["against"].as_array().unwrap() {
+        assert!(verdict["time"].is_null() && verdict["error"].is_object(), "{verdict}");
+    }
+    bench("--allow-busy").expect(2, &["--against"]);
     bench("--against scene.xml").expect(2, &["scene.xml", "bench --save"]);
     bench("--against gone.json").expect(3, &["gone.json"]);
     sandbox.run("bench cache --time 1ms").expect(2, &["no scenes"]);
