@@ -2,7 +2,7 @@
 //! before they are opened.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 use std::path::Path;
 
 /// Longest text (a scene, a material library, a table of numbers) that is read, in bytes.
@@ -11,14 +11,29 @@ pub const MAX_TEXT_BYTES: u64 = 1 << 30;
 /// Opens a regular file for reading and returns it with its length in bytes.
 ///
 /// # Errors
-/// If the file cannot be opened, or is a folder, a device, a pipe or a socket.
+/// If the file cannot be opened, or is a folder, a device, a pipe, a socket or a pointer of Git LFS.
 pub fn open_regular(path: &Path) -> io::Result<(File, u64)> {
     // Opening a pipe would wait for a writer, hence the check by name first.
     check_regular(&std::fs::metadata(path)?)?;
-    let file = File::open(path)?;
+    let mut file = File::open(path)?;
     let metadata = file.metadata()?;
     check_regular(&metadata)?;
+    check_fetched(&mut file)?;
     Ok((file, metadata.len()))
+}
+
+/// First bytes of a file that stands for a large one in a git repository.
+const LFS_POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
+
+/// Refuses a file whose content has not been fetched; leaves the others at their beginning.
+fn check_fetched(file: &mut File) -> io::Result<()> {
+    let mut start = Vec::with_capacity(LFS_POINTER.len());
+    file.by_ref().take(LFS_POINTER.len() as u64).read_to_end(&mut start)?;
+    if start == LFS_POINTER {
+        let message = "is a pointer of Git LFS, not the file itself: `git lfs pull` fetches it";
+        return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+    }
+    file.rewind()
 }
 
 /// Reads a regular file of at most `max_bytes` bytes.
@@ -71,5 +86,14 @@ mod tests {
         assert_eq!(read_regular(&path, 10).unwrap(), [7; 10]);
         assert!(read_regular(&path, 9).unwrap_err().to_string().contains("longer than 9 bytes"));
         assert_eq!(open_regular(&path).unwrap().1, 10);
+    }
+
+    #[test]
+    fn pointers_of_large_files_are_named_as_such() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 5\n").unwrap();
+        let messages = [read_regular(&path, 1000).unwrap_err(), open_regular(&path).unwrap_err()];
+        assert!(messages.iter().all(|e| e.to_string().contains("git lfs pull")), "{messages:?}");
     }
 }
