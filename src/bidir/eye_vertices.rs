@@ -3,21 +3,17 @@
 use super::warm_up::WarmUp;
 use crate::math::sampler::PathSampler;
 use crate::math::{Rgb, Vec3};
-use crate::path::{Edge, Place, ScatterSampler, StoredPlace, Vertex, WalkHooks, WalkRules, WalkStart, streams, walk};
+use crate::path::{Edge, ScatterSampler, StoredPlace, Vertex, WalkHooks, WalkRules, WalkStart, streams, walk};
 use crate::ray::{RayKind, RayStats, Tracer};
 use crate::shade::{BsdfPool, StoredBsdf, Transport};
 use rayon::prelude::*;
 
-/// A connectable surface vertex of an eye sub-path.
+/// A connectable vertex of an eye sub-path.
 #[derive(Clone, Copy, Debug)]
 pub struct EyeSubpathVertex {
-    /// Position.
-    pub p: Vec3,
-    /// Bound on the error of any component of `p`.
-    pub error: f32,
-    /// Unit geometric normal.
-    pub ng: Vec3,
-    /// `ng` on the side from which the sub-path came.
+    /// Place.
+    pub place: StoredPlace,
+    /// Unit geometric normal on the side from which the sub-path came; zero in a medium.
     pub side: Vec3,
     /// Unit direction towards the vertex before.
     pub wo: Vec3,
@@ -26,9 +22,9 @@ pub struct EyeSubpathVertex {
 }
 
 impl EyeSubpathVertex {
-    /// The place.
-    pub fn place(&self) -> StoredPlace {
-        StoredPlace::Surface { p: self.p, error: self.error, ng: self.ng }
+    /// Position.
+    pub fn p(&self) -> Vec3 {
+        self.place.position()
     }
 }
 
@@ -46,13 +42,10 @@ impl WalkHooks for EyeSubpathVertices {
         if v.scatter.is_black() {
             return false;
         }
-        if v.scatter.connectable()
-            && let Place::Surface { point, .. } = v.place
-        {
-            let side = v.place.stored().side_normal(v.wo);
+        if v.scatter.connectable() {
+            let place = v.place.stored();
             let bsdf = self.bsdfs.store(v.scatter.bsdf());
-            let (p, error, ng) = (point.p, point.error, point.ng);
-            self.vertices.push(EyeSubpathVertex { p, error, ng, side, wo: v.wo, bsdf });
+            self.vertices.push(EyeSubpathVertex { place, side: place.side_normal(v.wo), wo: v.wo, bsdf });
         }
         true
     }

@@ -39,8 +39,8 @@ impl LightVertex {
         pool.get(&self.bsdf, ng)
     }
 
-    /// q̂₂/p and q̂₁/p at a surface at `p` on the side of the unit normal `n`, visibility taken for granted. `bsdf` is
-    /// the vertex's BSDF.
+    /// q̂₂/p and q̂₁/p at a point `p` of a surface, on the side of the unit normal `n`, or of a medium, where `n` is zero;
+    /// visibility taken for granted. `bsdf` is the vertex's BSDF.
     #[inline]
     pub fn target_over_pdf(&self, bsdf: &BsdfView, p: Vec3, n: Vec3) -> ResamplingTarget {
         let Some((towards, jacobian)) = direction_to(self.place.position(), p, n) else {
@@ -56,7 +56,7 @@ impl LightVertex {
 }
 
 /// Unit direction from `from` to a surface at `p` on the side of the unit normal `n`, and the area Jacobian |cos| / d²
-/// there; none if it arrives from below.
+/// there; none if it arrives from below. In a medium `n` is zero, and the Jacobian 1 / d².
 #[inline]
 pub fn direction_to(from: Vec3, p: Vec3, n: Vec3) -> Option<(Vec3, f32)> {
     let to = p - from;
@@ -64,5 +64,8 @@ pub fn direction_to(from: Vec3, p: Vec3, n: Vec3) -> Option<(Vec3, f32)> {
     let towards = to * (1.0 / dist2.sqrt());
     let cos = -n.dot(towards);
     // A point has no direction to itself: NaN is not above the horizon.
-    (cos > 0.0).then_some((towards, cos / dist2))
+    if cos > 0.0 {
+        return Some((towards, cos / dist2));
+    }
+    (n == Vec3::ZERO && dist2 > 0.0).then(|| (towards, 1.0 / dist2))
 }

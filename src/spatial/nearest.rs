@@ -1,11 +1,12 @@
-//! Nearest neighbours of a surface point among a fixed set of oriented points.
+//! Nearest neighbours of a point on a surface or in a medium among a fixed set of such points.
 //!
 //! Every vertex of every sub-path queries, so results are cached: space is divided into cells, each with one slot for
-//! each of six directions that a surface may face, and a slot is filled by a search from the middle of its cell at its
-//! first query. The result is a function of cell and facing alone, whatever the order of queries.
+//! each of six directions that a surface may face, and one for points in media, and a slot is filled by a search from the
+//! middle of its cell at its first query. The result is a function of cell and facing alone, whatever the order of queries.
 //!
 //! With [`Metric::Facing`] only points whose surface faces about the same way are found: a point on the other side of a
-//! thin wall is near, but sees another room.
+//! thin wall is near, but sees another room. The normal of a point in a medium is zero; it finds, and is found by, its
+//! like alone.
 
 use crate::math::Vec3;
 use std::ops::Range;
@@ -13,6 +14,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Largest number of neighbours that a query returns.
 pub const MAX_NEIGHBORS: usize = 3;
+/// Directions that a surface may face.
+const FACINGS: usize = 6;
+/// Kind of points in media.
+const IN_MEDIUM: usize = FACINGS;
 /// Cells along the longest side of the box around the points.
 const CELLS: usize = 96;
 /// Bits of a point's number.
@@ -21,29 +26,36 @@ const BITS: u32 = 21;
 const NO_POINT: u64 = (1 << BITS) - 1;
 /// Set in slots that have been filled.
 const KNOWN: u64 = 1 << 63;
+/// A slot without neighbours.
+const NOTHING: u64 = KNOWN | (1 << (BITS as usize * MAX_NEIGHBORS)) - 1;
 
 /// Which points are candidates, by distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Metric {
-    /// Points whose surface faces about the same way.
+    /// Points whose surface faces about the same way, or of a medium.
     Facing,
     /// All points.
     Plain,
 }
 
 impl Metric {
-    /// Kind of surfaces with the normal `n`; points of different kinds have different neighbours.
+    /// Kind of points with the normal `n`; points of different kinds have different neighbours.
     #[inline]
     pub fn kind(self, n: Vec3) -> usize {
         match self {
+            Metric::Facing if n == Vec3::ZERO => IN_MEDIUM,
             Metric::Facing => facing(n),
             Metric::Plain => 0,
         }
     }
 
-    /// True if a point with the normal `n` is a candidate for surface points of a kind.
+    /// True if a point with the normal `n` is a candidate for points of a kind.
     fn finds(self, n: Vec3, kind: usize) -> bool {
-        self == Metric::Plain || faces(n, kind)
+        match kind {
+            _ if self == Metric::Plain => true,
+            IN_MEDIUM => n == Vec3::ZERO,
+            facing => faces(n, facing),
+        }
     }
 }
 
@@ -53,8 +65,8 @@ pub struct NearestPoints {
     metric: Metric,
     points: Vec<Vec3>,
     normals: Vec<Vec3>,
-    /// For each facing: a left-balanced kd-tree of the points that face that way, as a list of numbers.
-    trees: [Vec<u32>; 6],
+    /// For each kind: a left-balanced kd-tree of its candidates, as a list of numbers.
+    trees: Vec<Vec<u32>>,
     lo: Vec3,
     per_cell: f32,
     cells: [usize; 3],
@@ -139,17 +151,23 @@ impl NearestPoints {
     /// ones are never found.
     pub fn new(points: Vec<Vec3>, normals: Vec<Vec3>, metric: Metric) -> NearestPoints {
         let most = points.len().min(normals.len()).min(NO_POINT as usize);
-        let trees = std::array::from_fn(|f| {
-            let mut tree: Vec<u32> = (0..most as u32).filter(|&i| metric.finds(normals[i as usize], f)).collect();
+        let tree_of = |kind: usize| {
+            let mut tree: Vec<u32> = (0..most as u32).filter(|&i| metric.finds(normals[i as usize], kind)).collect();
             build_tree(&points, &mut tree, 0);
             tree
-        });
+        };
+        let kinds = match metric {
+            Metric::Plain => 1,
+            Metric::Facing if normals.contains(&Vec3::ZERO) => IN_MEDIUM + 1,
+            Metric::Facing => FACINGS,
+        };
+        let trees: Vec<Vec<u32>> = (0..kinds).map(tree_of).collect();
         let lo = points.iter().copied().fold(Vec3::INFINITY, Vec3::min);
         let hi = points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
         let size = if points.is_empty() { Vec3::ONE } else { hi - lo };
         let per_cell = CELLS as f32 / size.max_element().max(f32::MIN_POSITIVE);
         let cells = (size * per_cell).to_array().map(|s| (s.ceil() as usize).clamp(1, CELLS));
-        let slots = (0..cells.iter().product::<usize>() * 6).map(|_| AtomicU64::new(0)).collect();
+        let slots = (0..cells.iter().product::<usize>() * kinds).map(|_| AtomicU64::new(0)).collect();
         NearestPoints { metric, points, normals, trees, lo, per_cell, cells, slots, groups: None }
     }
 
@@ -180,20 +198,24 @@ impl NearestPoints {
         &self.normals
     }
 
-    /// Numbers of the points nearest to `p` (up to the size of a cell) among those whose surface faces about as `n`
-    /// does, nearest first; fewer than [`MAX_NEIGHBORS`] where there are not so many.
+    /// Numbers of the points nearest to `p` (up to the size of a cell) among the candidates for points with the normal
+    /// `n`, nearest first; fewer than [`MAX_NEIGHBORS`] where there are not so many.
     #[inline]
     pub fn find(&self, p: Vec3, n: Vec3) -> impl Iterator<Item = usize> + use<> {
         let cell = ((p - self.lo) * self.per_cell).to_array();
         // Negative numbers and NaN become zero.
         let cell: [usize; 3] = std::array::from_fn(|i| (cell[i] as usize).min(self.cells[i] - 1));
-        let facing = self.metric.kind(n);
-        let slot = &self.slots[((cell[2] * self.cells[1] + cell[1]) * self.cells[0] + cell[0]) * 6 + facing];
-        let mut found = slot.load(Ordering::Relaxed);
-        if found == 0 {
-            found = self.search(cell, facing);
-            // Threads that fill the same slot at once find the same.
-            slot.store(found, Ordering::Relaxed);
+        let (kind, kinds) = (self.metric.kind(n), self.trees.len());
+        let mut found = NOTHING;
+        // No point is of a medium if that kind is not there.
+        if kind < kinds {
+            let slot = &self.slots[((cell[2] * self.cells[1] + cell[1]) * self.cells[0] + cell[0]) * kinds + kind];
+            found = slot.load(Ordering::Relaxed);
+            if found == 0 {
+                found = self.search(cell, kind);
+                // Threads that fill the same slot at once find the same.
+                slot.store(found, Ordering::Relaxed);
+            }
         }
         (0..MAX_NEIGHBORS as u32)
             .map(move |i| found >> (i * BITS) & NO_POINT)
@@ -202,13 +224,13 @@ impl NearestPoints {
     }
 
     #[cold]
-    fn search(&self, cell: [usize; 3], facing: usize) -> u64 {
+    fn search(&self, cell: [usize; 3], kind: usize) -> u64 {
         let middle = self.lo + Vec3::from(cell.map(|c| c as f32 + 0.5)) / self.per_cell;
         let mut best = Best { distance2: [f32::INFINITY; MAX_NEIGHBORS], number: [NO_POINT; MAX_NEIGHBORS] };
-        search(&self.points, &self.trees[facing], 0, middle, &mut best);
+        search(&self.points, &self.trees[kind], 0, middle, &mut best);
         if let Some(group) = self.groups.as_ref().and_then(|groups| groups.get(best.number[0] as usize)) {
             best = Best { distance2: [f32::INFINITY; MAX_NEIGHBORS], number: [NO_POINT; MAX_NEIGHBORS] };
-            for i in group.clone().filter(|&i| self.metric.finds(self.normals[i], facing)) {
+            for i in group.clone().filter(|&i| self.metric.finds(self.normals[i], kind)) {
                 best.offer(middle.distance_squared(self.points[i]), i as u32);
             }
         }
@@ -270,5 +292,18 @@ mod tests {
         let one = NearestPoints::new(vec![Vec3::ONE], vec![Vec3::Y], Metric::Facing);
         assert_eq!(one.find(Vec3::splat(f32::NAN), Vec3::Y).collect::<Vec<_>>(), [0]);
         assert_eq!(one.find(Vec3::splat(1e9), Vec3::NEG_Y).count(), 0);
+        assert_eq!(one.find(Vec3::ONE, Vec3::ZERO).count(), 0);
+    }
+
+    #[test]
+    fn points_in_media_find_each_other_alone() {
+        let points: Vec<Vec3> = (0..8).map(|i| Vec3::X * i as f32).collect();
+        let normals = vec![Vec3::Y, Vec3::ZERO, Vec3::Y, Vec3::ZERO, Vec3::ZERO, Vec3::Y, Vec3::ZERO, Vec3::Y];
+        let index = NearestPoints::new(points.clone(), normals.clone(), Metric::Facing);
+        assert_eq!(index.find(Vec3::ZERO, Vec3::ZERO).collect::<Vec<_>>(), [1, 3, 4]);
+        assert_eq!(index.find(Vec3::ZERO, Vec3::Y).collect::<Vec<_>>(), [0, 2, 5]);
+        assert_eq!(index.find(Vec3::ZERO, Vec3::X).count(), 0);
+        let plain = NearestPoints::new(points, normals, Metric::Plain);
+        assert_eq!(plain.find(Vec3::ZERO, Vec3::ZERO).collect::<Vec<_>>(), [0, 1, 2]);
     }
 }

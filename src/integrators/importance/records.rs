@@ -1,11 +1,12 @@
 //! The places at which importance caching keeps pmfs: records on surfaces, or nodes in the middle of empty space.
 //!
-//! Records are the vertices of few eye sub-paths (Georgiev et al. 2012, "Importance caching for complex illumination").
-//! Nodes are those of the scene's skeleton (Noël and Biri 2015, "Skeleton based vertex connection resampling"); those
-//! that hardly any eye vertex belongs to are left out, and eye vertices there draw uniformly (§4.4).
+//! Records are the vertices of few eye sub-paths, on surfaces and in media (Georgiev et al. 2012, "Importance caching for
+//! complex illumination"). Nodes are those of the scene's skeleton (Noël and Biri 2015, "Skeleton based vertex connection
+//! resampling"); those that hardly any eye vertex belongs to are left out, and eye vertices there draw uniformly (§4.4).
 
 use super::record_pmfs::Selection;
 use crate::bidir::WarmUp;
+use crate::bidir::eye_vertices::EyeSubpathVertex;
 use crate::bidir::vertex::direction_to;
 use crate::math::{Rgb, Vec3};
 use crate::ray::offset::SegmentEnd;
@@ -23,7 +24,7 @@ const COUNTED: f64 = 4096.0;
 pub(super) struct ImportanceRecords {
     /// Where shadow rays end.
     pub ends: Vec<SegmentEnd>,
-    /// Unit normals of records on surfaces, on the side that sees.
+    /// Unit normals of records on surfaces, on the side that sees; zero in media.
     pub normals: Option<Vec<Vec3>>,
     finder: Finder,
 }
@@ -43,11 +44,11 @@ impl ImportanceRecords {
     /// Records on surfaces: the vertices of `fraction` times as many eye sub-paths as the picture has pixels.
     pub fn on_surfaces(warm_up: &WarmUp, fraction: f64) -> (ImportanceRecords, RayStats) {
         let (found, stats) = warm_up.eye_vertices(fraction);
-        let positions: Vec<Vec3> = found.vertices.iter().map(|c| c.p).collect();
+        let positions: Vec<Vec3> = found.vertices.iter().map(EyeSubpathVertex::p).collect();
         let all: Vec<_> = morton::order(&positions).into_iter().map(|i| found.vertices[i as usize]).collect();
         let normals: Vec<Vec3> = all.iter().map(|c| c.side).collect();
-        let index = NearestPoints::new(all.iter().map(|c| c.p).collect(), normals.clone(), Metric::Facing);
-        let ends = all.iter().map(|c| c.place().segment_end()).collect();
+        let index = NearestPoints::new(all.iter().map(EyeSubpathVertex::p).collect(), normals.clone(), Metric::Facing);
+        let ends = all.iter().map(|c| c.place.segment_end()).collect();
         let finder = Finder::Nearest(Box::new(index));
         (ImportanceRecords { ends, normals: Some(normals), finder }, stats)
     }
@@ -60,7 +61,7 @@ impl ImportanceRecords {
         let (found, stats) = warm_up.eye_vertices(COUNTED / pixels);
         let mut mapped = vec![0u32; skeleton.nodes.len()];
         for v in &found.vertices {
-            if let Some(node) = skeleton.node_of(v.p, v.side) {
+            if let Some(node) = skeleton.node_of(v.p(), v.side) {
                 mapped[node] += 1;
             }
         }

@@ -1,4 +1,4 @@
-//! Cache points: surface points at which the pmfs of light vertices are found for the eye vertices around.
+//! Cache points: points of surfaces and media at which the pmfs of light vertices are found for the eye vertices around.
 //!
 //! They are the vertices of a few eye sub-paths (a fixed fraction of the number of pixels), traced once. Those that are
 //! near each other and face the same way form groups of up to sixteen, which share, where there are two stages, the
@@ -75,8 +75,8 @@ fn group(points: &mut [EyeSubpathVertex], size: usize, first: usize, groups: &mu
         groups.push(first..first + points.len());
         return;
     }
-    let lo = points.iter().fold(Vec3::INFINITY, |lo, c| lo.min(c.p));
-    let hi = points.iter().fold(Vec3::NEG_INFINITY, |hi, c| hi.max(c.p));
+    let lo = points.iter().fold(Vec3::INFINITY, |lo, c| lo.min(c.p()));
+    let hi = points.iter().fold(Vec3::NEG_INFINITY, |hi, c| hi.max(c.p()));
     let sides = hi - lo;
     let axis = if sides.x >= sides.y && sides.x >= sides.z {
         0
@@ -86,7 +86,7 @@ fn group(points: &mut [EyeSubpathVertex], size: usize, first: usize, groups: &mu
         2
     };
     let middle = points.len().div_ceil(2).next_multiple_of(size).min(points.len() - 1);
-    points.select_nth_unstable_by(middle, |a, b| a.p[axis].total_cmp(&b.p[axis]));
+    points.select_nth_unstable_by(middle, |a, b| a.p()[axis].total_cmp(&b.p()[axis]));
     let (left, right) = points.split_at_mut(middle);
     group(left, size, first, groups);
     group(right, size, first + middle, groups);
@@ -96,7 +96,7 @@ fn group(points: &mut [EyeSubpathVertex], size: usize, first: usize, groups: &mu
 fn leave_one_out_neighbors(points: &[EyeSubpathVertex], groups: &[Range<usize>]) -> Vec<u16> {
     let nearest = |group: &Range<usize>, own: usize| {
         let mut others: Vec<usize> = group.clone().filter(|&i| i != own).collect();
-        let distance = |i: &usize| points[own].p.distance_squared(points[*i].p);
+        let distance = |i: &usize| points[own].p().distance_squared(points[*i].p());
         others.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         others.iter().take(MAX_NEIGHBORS).fold(0, |bits, i| bits | 1 << (i - group.start))
     };
@@ -106,13 +106,13 @@ fn leave_one_out_neighbors(points: &[EyeSubpathVertex], groups: &[Range<usize>])
 /// Initial states of the points.
 fn states(points: &[EyeSubpathVertex], groups: &[Range<usize>]) -> Vec<CacheState> {
     let inv_trust_radius2 = groups.iter().flat_map(|group| {
-        let centre = points[group.clone()].iter().map(|c| c.p).sum::<Vec3>() / group.len() as f32;
-        let sum: f32 = points[group.clone()].iter().map(|c| c.p.distance_squared(centre)).sum();
+        let centre = points[group.clone()].iter().map(|c| c.p()).sum::<Vec3>() / group.len() as f32;
+        let sum: f32 = points[group.clone()].iter().map(|c| c.p().distance_squared(centre)).sum();
         let radius2 = TRUST_RADII * TRUST_RADII * sum / group.len() as f32;
         std::iter::repeat_n((1.0 / radius2).min(f32::MAX), group.len())
     });
     let state = |(c, inv_trust_radius2): (&EyeSubpathVertex, f32)| CacheState {
-        p: c.p,
+        p: c.p(),
         inv_trust_radius2,
         side: c.side,
         means: [0.0; 3],
@@ -137,13 +137,13 @@ impl CachePoints {
             group(&mut all[first..first + count], settings.group_size, first, &mut groups);
             first += count;
         }
-        let (points, sides) = (all.iter().map(|c| c.p).collect(), all.iter().map(|c| c.side).collect());
+        let (points, sides) = (all.iter().map(EyeSubpathVertex::p).collect(), all.iter().map(|c| c.side).collect());
         let index = NearestPoints::new(points, sides, metric);
         let index = if settings.second_stage.is_some() { index.within_groups(&groups) } else { index };
         let each = || all.iter().map(|c| (c.wo, c.bsdf)).collect();
         let caches = CachePoints {
             index,
-            ends: all.iter().map(|c| c.place().segment_end()).collect(),
+            ends: all.iter().map(|c| c.place.segment_end()).collect(),
             leave_one_out_neighbors: leave_one_out_neighbors(&all, &groups),
             bsdfs: settings.radiance.then(|| CacheBsdfs { each: each(), pool }),
             states: states(&all, &groups),
@@ -172,7 +172,7 @@ impl CachePoints {
         self.bsdfs.is_some()
     }
 
-    /// Radiance that the surface at a cache point scatters to the eye, of light from the point `y` that causes the
+    /// Radiance that a cache point scatters to the eye, of light from the point `y` that causes the
     /// irradiance `irradiance` there. Without BSDFs at cache points it is the irradiance.
     #[inline]
     pub fn scattered(&self, cache: usize, y: Vec3, irradiance: f32) -> f32 {
@@ -180,9 +180,12 @@ impl CachePoints {
         let (wo, bsdf) = &each[cache];
         let CacheState { p, side, .. } = self.states[cache];
         let from = (y - p).normalize_or_zero();
-        let SegmentEnd::Surface { ng, .. } = self.ends[cache] else { return irradiance };
-        // The cosine is a factor of the irradiance, and of the value again.
-        let weight = pool.get(bsdf, ng).eval(*wo, from, Transport::Radiance).luminance() * irradiance / side.dot(from);
+        // The cosine is a factor of the irradiance, and of the value on a surface again.
+        let (ng, cosine) = match self.ends[cache] {
+            SegmentEnd::Surface { ng, .. } => (ng, side.dot(from)),
+            SegmentEnd::Free(_) => (Vec3::ZERO, 1.0),
+        };
+        let weight = pool.get(bsdf, ng).eval(*wo, from, Transport::Radiance).luminance() * irradiance / cosine;
         if weight.is_finite() { weight } else { 0.0 }
     }
 
@@ -213,7 +216,9 @@ impl CachePoints {
             count += 1.0;
             cache_radius2 = cache_radius2.max(1.0 / (state.inv_trust_radius2 * (TRUST_RADII * TRUST_RADII)));
             let distance = p.distance_squared(state.p) * state.inv_trust_radius2;
-            unrelated = unrelated.min(distance + TILT * (1.0 - n.dot(state.side)));
+            // Points in media have no tilt.
+            let tilt = if n == Vec3::ZERO { 0.0 } else { 1.0 - n.dot(state.side) };
+            unrelated = unrelated.min(distance + TILT * tilt);
         }
         if count == 0.0 {
             return NormalizationEstimate::default();
@@ -290,7 +295,7 @@ mod tests {
                 let [x, y, z, _] = rng.next_4();
                 let (p, n) = (Vec3::new(x, y, z), Vec3::Z);
                 let bsdf = pool.store(&Bsdf::empty(&SurfacePoint::default()));
-                EyeSubpathVertex { p, side: n, error: 0.0, ng: n, wo: n, bsdf }
+                EyeSubpathVertex { place: StoredPlace::Surface { p, error: 0.0, ng: n }, side: n, wo: n, bsdf }
             })
             .collect();
         for size in [16, 8, 3, 1] {
@@ -301,8 +306,8 @@ mod tests {
             assert!(groups.iter().map(ExactSizeIterator::len).eq(sizes), "{size}");
             assert!(groups.windows(2).all(|w| w[0].end == w[1].start) && groups[0].start == 0);
             for g in &groups {
-                let centre = points[g.clone()].iter().map(|c| c.p).sum::<Vec3>() / g.len() as f32;
-                assert!(points[g.clone()].iter().all(|c| c.p.distance(centre) < 0.4));
+                let centre = points[g.clone()].iter().map(|c| c.p()).sum::<Vec3>() / g.len() as f32;
+                assert!(points[g.clone()].iter().all(|c| c.p().distance(centre) < 0.4));
             }
         }
         let mut groups = vec![];
