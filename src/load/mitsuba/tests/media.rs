@@ -231,3 +231,33 @@ fn grids_with_mistakes_are_refused() {
     let huge = cube(&format!("{}<float name=\"scale\" value=\"1e38\"/>", grid_volume("sigma_t", "")), "heterogeneous");
     assert_eq!(messages(with_grid(&scene(&huge), [1; 3], &[7.0]))[0].0, "scene::bad-value");
 }
+
+#[test]
+fn open_boundaries_are_warned_of() {
+    let side = |transform: &str| {
+        format!(
+            "<shape type=\"rectangle\"><transform name=\"to_world\"><translate z=\"1\"/>{transform}</transform>\
+             <ref name=\"interior\" id=\"fog\"/></shape>"
+        )
+    };
+    let fog = "<medium type=\"homogeneous\" id=\"fog\"/>";
+    let turns = [
+        "",
+        "<rotate x=\"1\" angle=\"90\"/>",
+        "<rotate x=\"1\" angle=\"180\"/>",
+        "<rotate x=\"1\" angle=\"270\"/>",
+        "<rotate y=\"1\" angle=\"90\"/>",
+        "<rotate y=\"1\" angle=\"270\"/>",
+    ];
+    let sides: Vec<String> = turns.map(side).into();
+    good(&format!("{fog}{}", sides.concat()));
+    good(&format!("{fog}<shape type=\"sphere\"><ref name=\"exterior\" id=\"fog\"/></shape>"));
+    // The same medium on both sides ends nowhere.
+    good(&format!(
+        "{fog}<shape type=\"rectangle\"><ref name=\"interior\" id=\"fog\"/><ref name=\"exterior\" id=\"fog\"/></shape>"
+    ));
+    for open in [sides[..5].concat(), "<shape type=\"cylinder\"><ref name=\"interior\" id=\"fog\"/></shape>".into()] {
+        let found = messages(load(&scene(&format!("{fog}{open}"))));
+        assert_eq!(found.iter().map(|m| m.0).collect::<Vec<_>>(), ["scene::open-boundary"], "{open}");
+    }
+}
