@@ -63,6 +63,20 @@ impl LensSample {
     }
 }
 
+/// Half extents, at distance one, of a picture that is seen under the angle `fov` (degrees) along an axis; `aspect` is
+/// its width over its height.
+pub(super) fn half_extents(fov: f64, axis: FovAxis, aspect: f64) -> Vec2 {
+    let tan = (0.5 * fov.to_radians()).tan();
+    let half_x = match axis {
+        FovAxis::X => tan,
+        FovAxis::Y => tan * aspect,
+        FovAxis::Diagonal => tan / (1.0 + 1.0 / (aspect * aspect)).sqrt(),
+        FovAxis::Smaller => tan * aspect.max(1.0),
+        FovAxis::Larger => tan * aspect.min(1.0),
+    };
+    Vec2::new(half_x as f32, (half_x / aspect) as f32)
+}
+
 /// A camera.
 #[derive(Clone, Debug)]
 pub struct Camera {
@@ -104,33 +118,12 @@ impl Camera {
             return Err(EmitError::Transform("camera"));
         }
 
-        let aspect = w / h;
-        let tan = (0.5 * desc.fov.to_radians()).tan();
-        let half_x = match desc.fov_axis {
-            FovAxis::X => tan,
-            FovAxis::Y => tan * aspect,
-            FovAxis::Diagonal => tan / (1.0 + 1.0 / (aspect * aspect)).sqrt(),
-            FovAxis::Smaller => {
-                if aspect > 1.0 {
-                    tan * aspect
-                } else {
-                    tan
-                }
-            }
-            FovAxis::Larger => {
-                if aspect > 1.0 {
-                    tan
-                } else {
-                    tan * aspect
-                }
-            }
-        };
         let margin = (PixelFilter::new(film.filter).radius() - 0.5).max(0.0);
         let [cx, cy, cw, ch] = film.crop.unwrap_or([0, 0, film.width, film.height]).map(|v| v as f32);
         Ok(Camera {
             position,
             orientation,
-            half: Vec2::new(half_x as f32, (half_x / aspect) as f32),
+            half: half_extents(desc.fov, desc.fov_axis, w / h),
             size: Vec2::new(w as f32, h as f32),
             principal: Vec2::new(desc.principal_point[0] as f32, desc.principal_point[1] as f32),
             near: desc.near_clip as f32,

@@ -18,7 +18,7 @@ pub struct PointLight {
 }
 
 /// Direct light from a point: inverse square law.
-fn direct_from_point(position: Vec3, from: Vec3, intensity: impl Fn(Vec3) -> Rgb) -> Option<DirectSample> {
+pub(super) fn direct_from_point(position: Vec3, from: Vec3, intensity: impl Fn(Vec3) -> Rgb) -> Option<DirectSample> {
     let to = position - from;
     let distance = to.length();
     if !(distance > 0.0 && distance.is_finite()) {
@@ -40,7 +40,12 @@ fn direct_from_point(position: Vec3, from: Vec3, intensity: impl Fn(Vec3) -> Rgb
 }
 
 /// An emission ray from a point.
-fn emission_from_point(position: Vec3, direction: Vec3, radiance: Rgb, pdf: SolidAnglePdf) -> EmissionSample {
+pub(super) fn emission_from_point(
+    position: Vec3,
+    direction: Vec3,
+    radiance: Rgb,
+    pdf: SolidAnglePdf,
+) -> EmissionSample {
     EmissionSample {
         origin: position,
         error: 0.0,

@@ -2,6 +2,7 @@
 
 use super::delta::{DirectionalLight, PointLight, SpotLight};
 use super::environment::EnvironmentLight;
+use super::projector::Projector;
 use super::round::RoundLight;
 use super::sample::{DirectSample, EmissionSample, EmitterVertex};
 use super::triangle::TriangleLight;
@@ -21,6 +22,8 @@ pub enum Light {
     Point(PointLight),
     /// A point that shines into a cone.
     Spot(Box<SpotLight>),
+    /// A point that projects a picture.
+    Projector(Box<Projector>),
     /// Parallel light.
     Directional(DirectionalLight),
     /// Radiance from all directions.
@@ -37,6 +40,7 @@ impl Light {
             Light::Round(l) => l.sample_direct(from, u),
             Light::Point(l) => l.sample_direct(from),
             Light::Spot(l) => l.sample_direct(from),
+            Light::Projector(l) => l.sample_direct(from),
             Light::Directional(l) => l.sample_direct(),
             Light::Environment(l) => l.sample_direct(u),
         }
@@ -74,6 +78,7 @@ impl Light {
             Light::Round(l) => l.sample_emission(u_pos, u_dir),
             Light::Point(l) => Some(l.sample_emission(u_dir)),
             Light::Spot(l) => Some(l.sample_emission(u_dir)),
+            Light::Projector(l) => Some(l.sample_emission(u_dir)),
             Light::Directional(l) => Some(l.sample_emission(u_pos)),
             Light::Environment(l) => l.sample_emission(u_pos, u_dir),
         }
@@ -89,6 +94,7 @@ impl Light {
             Light::Round(l) => l.pdf_emission(ng, wo),
             Light::Point(l) => (AreaPdf(0.0), l.pdf_direction()),
             Light::Spot(l) => (AreaPdf(0.0), l.pdf_direction(wo)),
+            Light::Projector(l) => (AreaPdf(0.0), l.pdf_direction(wo)),
             Light::Directional(l) => (l.pdf_position(), SolidAnglePdf(0.0)),
             Light::Environment(l) => l.pdf_emission(wo),
         }
@@ -101,6 +107,7 @@ impl Light {
         match self {
             Light::Point(l) => (AreaPdf(1.0), l.pdf_direction()),
             Light::Spot(l) => (AreaPdf(1.0), l.pdf_direction(wo)),
+            Light::Projector(l) => (AreaPdf(1.0), l.pdf_direction(wo)),
             Light::Directional(l) => (l.pdf_position(), SolidAnglePdf(1.0)),
             _ => self.pdf_emission(ng, wo),
         }
@@ -125,6 +132,7 @@ impl Light {
             Light::Round(l) => l.power(),
             Light::Point(l) => l.power(),
             Light::Spot(l) => l.power(),
+            Light::Projector(l) => l.power(),
             Light::Directional(l) => l.power(),
             Light::Environment(l) => l.power(),
         }
@@ -152,6 +160,9 @@ impl Light {
             Light::Spot(l) => {
                 (Aabb::of([l.position()]), Cone { axis: l.axis(), half_angle: l.cutoff(), emission: 1e-3 })
             }
+            Light::Projector(l) => {
+                (Aabb::of([l.position()]), Cone { axis: l.axis(), half_angle: l.half_angle(), emission: 1e-3 })
+            }
             Light::Directional(_) | Light::Environment(_) => return None,
         };
         Some(LightBounds { aabb, cone, power })
@@ -169,7 +180,7 @@ impl Light {
 
     /// True if the light is a point in space.
     pub fn delta_position(&self) -> bool {
-        matches!(self, Light::Point(_) | Light::Spot(_))
+        matches!(self, Light::Point(_) | Light::Spot(_) | Light::Projector(_))
     }
 
     /// True if the light emits in one direction only.
@@ -185,6 +196,7 @@ impl Light {
             Light::Round(_) => EmitterVertex::Surface { p, error, ng },
             Light::Point(l) => EmitterVertex::Point { p: l.position() },
             Light::Spot(l) => EmitterVertex::Point { p: l.position() },
+            Light::Projector(l) => EmitterVertex::Point { p: l.position() },
             Light::Directional(_) | Light::Environment(_) => EmitterVertex::Infinite,
         }
     }

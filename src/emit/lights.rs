@@ -9,7 +9,7 @@ use crate::math::cdf::PrefixSums;
 use crate::math::discrete::AliasTable;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Pmf, Vec3};
-use crate::spatial::light_tree::{OrientedSource, WideLightTree};
+use crate::spatial::light_tree::{LightBounds, OrientedSource, WideLightTree};
 use std::ops::Range;
 
 /// Index of a light in its [`LightSet`].
@@ -58,7 +58,11 @@ impl Direct {
         let far_power = |(l, &p): (&Light, &f32)| if l.is_infinite() && p.is_finite() { p.max(0.0) } else { 0.0 };
         let infinite = PrefixSums::new(lights.iter().zip(powers).map(far_power));
         let infinite_share = far as f32 / (far + 1) as f32;
-        let source = |(i, light): (usize, &Light)| Some(OrientedSource { index: i as u32, bounds: light.bounds()? });
+        let source = |(i, light): (usize, &Light)| {
+            let bounds = light.bounds()?;
+            let bounds = LightBounds { power: powers[i], ..bounds };
+            (powers[i] > 0.0).then_some(OrientedSource { index: i as u32, bounds })
+        };
         let tree = WideLightTree::new(lights.iter().enumerate().filter_map(source).collect());
         Some(Direct { tree, infinite_share, infinite })
     }
@@ -88,7 +92,14 @@ impl Direct {
 impl LightSet {
     /// From lights; the index of a light is its [`LightId`].
     pub fn new(lights: Vec<Light>) -> LightSet {
-        let powers: Vec<f32> = lights.iter().map(Light::power).collect();
+        let weights = vec![1.0; lights.len()];
+        LightSet::weighted(lights, &weights)
+    }
+
+    /// From lights that are sampled by their powers times `weights`. A light of weight zero is never sampled: it shines
+    /// only where rays meet it.
+    pub fn weighted(lights: Vec<Light>, weights: &[f32]) -> LightSet {
+        let powers: Vec<f32> = lights.iter().zip(weights).map(|(light, weight)| light.power() * weight).collect();
         let infinite = (0..lights.len()).filter(|&i| lights[i].is_infinite()).map(|i| LightId(i as u32)).collect();
         let direct = Direct::new(&lights, &powers);
         LightSet { infinite, by_power: AliasTable::new(&powers), direct, lights }

@@ -218,7 +218,11 @@ impl Model {
                 "load::added-sky",
                 "nothing in this file shines: a sky of constant radiance 1 is added",
             ));
-            self.scene.emitters.push(EmitterDesc { kind: EmitterKind::Constant { radiance: Rgb::WHITE }, span: None });
+            self.scene.emitters.push(EmitterDesc {
+                kind: EmitterKind::Constant { radiance: Rgb::WHITE },
+                sampling_weight: 1.0,
+                span: None,
+            });
         }
         match framing::camera(&self.scene, &options.camera) {
             Ok(camera) => self.scene.sensors.push(camera),

@@ -89,7 +89,7 @@ impl PreparedScene {
         let radius = lo.abs().max(hi.abs()).length();
         let camera = Camera::new(&sensor, centre)?;
         check_range(&placed, &desc, radius.max(camera.position().length()), diagnostics)?;
-        let lights = LightSet::new(all_lights(&mut placed, &desc, &textures, Extent { centre, radius })?);
+        let lights = all_lights(&mut placed, &desc, &textures, Extent { centre, radius })?;
         let PlacedScene { geometry, meshes, instance_normals, .. } = placed;
 
         let mut features =

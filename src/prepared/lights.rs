@@ -4,12 +4,13 @@
 use super::MeshShading;
 use super::placing::PlacedScene;
 use crate::emit::{
-    DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, PointLight, Projection, RadianceTexture,
-    RoundEmission, RoundLight, SpotLight, SunSky, SunSkyParams, TexturedEmission, TriangleEmission, TriangleLight,
+    DirectionalLight, EmitError, EnvMap, Environment, EnvironmentLight, Light, LightSet, PointLight, Projection,
+    Projector, RadianceTexture, RoundEmission, RoundLight, SpotLight, SunSky, SunSkyParams, TexturedEmission,
+    TriangleEmission, TriangleLight,
 };
 use crate::math::{DVec3, Rgb, Vec2};
 use crate::ray::{MeshBuffers, RoundShape};
-use crate::scene::{AreaEmission, ColorDesc, EmitterDesc, EmitterKind, ImageDesc, SceneDesc};
+use crate::scene::{AreaEmission, ColorDesc, EmitterDesc, EmitterKind, ImageDesc, SceneDesc, TextureDesc};
 use crate::shade::{ColorTexture, SurfacePoint, TextureSet};
 use std::sync::Arc;
 
@@ -28,8 +29,8 @@ pub(super) fn all_lights(
     desc: &SceneDesc,
     textures: &TextureSet,
     extent: Extent,
-) -> Result<Vec<Light>, EmitError> {
-    let mut lights = vec![];
+) -> Result<LightSet, EmitError> {
+    let (mut lights, mut weights) = (vec![], vec![]);
     let PlacedScene { geometry, meshes, emission, .. } = placed;
     for (i, (shading, emission)) in meshes.iter_mut().zip(&*emission).enumerate() {
         let Some(emission) = emission else { continue };
@@ -38,11 +39,13 @@ pub(super) fn all_lights(
             Some(shape) => lights.push(round_light(shape, emission, textures)),
             None => triangle_lights(&geometry.meshes[i], shading, emission, textures, &mut lights),
         }
+        weights.resize(lights.len(), emission.sampling_weight);
     }
     for emitter in &desc.emitters {
-        lights.push(emitter_light(emitter, &desc.images, textures, extent)?);
+        lights.push(emitter_light(emitter, desc, textures, extent)?);
+        weights.push(emitter.sampling_weight);
     }
-    Ok(lights)
+    Ok(LightSet::weighted(lights, &weights))
 }
 
 /// A texture as the emission of a surface or the picture that a spot light projects.
@@ -104,7 +107,7 @@ fn triangle_lights(
 
 fn emitter_light(
     emitter: &EmitterDesc,
-    images: &[ImageDesc],
+    desc: &SceneDesc,
     textures: &TextureSet,
     extent: Extent,
 ) -> Result<Light, EmitError> {
@@ -119,11 +122,30 @@ fn emitter_light(
             }
             Light::Spot(Box::new(light))
         }
+        EmitterKind::Projector(projector) => {
+            let picture = Arc::new(Emission(textures.color(projector.irradiance)));
+            let aspect = aspect_ratio(projector.irradiance, desc);
+            Light::Projector(Box::new(Projector::new(projector, picture, aspect, centre)?))
+        }
         EmitterKind::Directional { direction, irradiance } => {
             Light::Directional(DirectionalLight::new(*direction, *irradiance, radius)?)
         }
-        environment => Light::Environment(Box::new(EnvironmentLight::new(surroundings(environment, images)?, radius))),
+        environment => {
+            Light::Environment(Box::new(EnvironmentLight::new(surroundings(environment, &desc.images)?, radius)))
+        }
     })
+}
+
+/// Width over height of a picture in pixels; other textures are square.
+fn aspect_ratio(color: ColorDesc, desc: &SceneDesc) -> f64 {
+    let ColorDesc::Texture(id) = color else { return 1.0 };
+    match desc.textures[id.index()] {
+        TextureDesc::Bitmap { image, .. } => {
+            let image = &desc.images[image.index()].image;
+            f64::from(image.width) / f64::from(image.height)
+        }
+        _ => 1.0,
+    }
 }
 
 /// The radiance of a light that surrounds the scene.
@@ -140,8 +162,9 @@ fn surroundings(kind: &EmitterKind, images: &[ImageDesc]) -> Result<Environment,
         }
         EmitterKind::Constant { radiance } => Environment::Constant(*radiance),
         // Lights at a place do not surround the scene.
-        EmitterKind::Point { .. } | EmitterKind::Spot { .. } | EmitterKind::Directional { .. } => {
-            Environment::Constant(Rgb::BLACK)
-        }
+        EmitterKind::Point { .. }
+        | EmitterKind::Spot { .. }
+        | EmitterKind::Projector(_)
+        | EmitterKind::Directional { .. } => Environment::Constant(Rgb::BLACK),
     })
 }

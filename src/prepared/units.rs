@@ -3,7 +3,7 @@
 
 use super::placing::{bounds, bounds_of};
 use crate::math::DVec3;
-use crate::scene::{BsdfKind, EmitterKind, GroupDesc, SceneDesc, SensorDesc, VolumeDesc};
+use crate::scene::{BsdfKind, EmitterKind, GroupDesc, ProjectorDesc, SceneDesc, SensorDesc, VolumeDesc};
 use glam::DMat4;
 use std::ops::RangeInclusive;
 
@@ -61,6 +61,11 @@ fn scale_scene(desc: &mut SceneDesc, scale: f64) {
             EmitterKind::Spot { to_world, intensity, .. } => {
                 scale_place(to_world, scale);
                 squared(intensity);
+            }
+            EmitterKind::Projector(ProjectorDesc { to_world, scale: brightness, .. }) => {
+                scale_place(to_world, scale);
+                *brightness *= scale as f32;
+                *brightness *= scale as f32;
             }
             EmitterKind::Directional { .. }
             | EmitterKind::Constant { .. }

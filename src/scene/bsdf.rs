@@ -309,6 +309,17 @@ macro_rules! bsdf_models {
                 /// Account for colour shifts by internal scattering.
                 nonlinear: bool = flag("nonlinear", false),
             }
+            /// A rough reflection added to a diffuse base (Baek et al. 2018), without polarization.
+            "pplastic" PolarizedPlastic(PolarizedPlasticParams) {
+                /// Microfacets of the reflection.
+                roughness: Roughness<V> = roughness(),
+                /// Refractive index, interior / exterior.
+                eta: f32 = relative_ior(POLYPROPYLENE),
+                /// Albedo of the base.
+                diffuse_reflectance: V::Color = color("diffuse_reflectance", 0.5),
+                /// Tint of the reflection.
+                specular_reflectance: V::Color = color("specular_reflectance", 1.0),
+            }
             /// The "Disney" material (Burley 2012, 2015) with Mitsuba 3's parameters, each in [0, 1] unless said
             /// otherwise.
             "principled" Principled(PrincipledParams) {

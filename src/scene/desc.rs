@@ -336,6 +336,8 @@ pub struct ShapeDesc {
 pub struct AreaEmission {
     /// Radiance, W/(m² sr) in the file's units.
     pub radiance: ColorDesc,
+    /// Multiplies the probability of being sampled.
+    pub sampling_weight: f32,
     /// Where it stands.
     pub span: Option<Span>,
 }
@@ -363,8 +365,26 @@ pub struct InstanceDesc {
 pub struct EmitterDesc {
     /// Its kind.
     pub kind: EmitterKind,
+    /// Multiplies the probability of being sampled.
+    pub sampling_weight: f32,
     /// Where it stands.
     pub span: Option<Span>,
+}
+
+/// A point that projects a picture, as a pinhole camera sees one: +z of its space is the axis, +x the left of the
+/// picture, +y its top.
+#[derive(Clone, Debug)]
+pub struct ProjectorDesc {
+    /// Light → world.
+    pub to_world: DMat4,
+    /// The picture: the irradiance at distance one on its axis, over π.
+    pub irradiance: ColorDesc,
+    /// Multiplies the picture.
+    pub scale: f32,
+    /// Angle in degrees under which the picture is seen from the light.
+    pub fov: f64,
+    /// Direction in which `fov` is measured.
+    pub fov_axis: FovAxis,
 }
 
 /// Lights that are not surfaces. Spaces: light space → world by `to_world`.
@@ -390,6 +410,8 @@ pub enum EmitterKind {
         /// Multiplies the intensity; projected on the square that just holds the cone.
         texture: Option<TextureId>,
     },
+    /// A picture thrown from a point.
+    Projector(ProjectorDesc),
     /// Parallel light from infinity.
     Directional {
         /// World direction in which the light travels.

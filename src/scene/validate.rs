@@ -1,6 +1,7 @@
 //! Checks of a whole scene that no single element shows: nothing to see, nothing that shines, an empty film.
 
-use super::desc::{EmitterKind, MeshDesc, MeshId, SceneDesc, ShapeDesc, ShapeGeometry};
+use super::boundaries;
+use super::desc::{EmitterKind, MeshDesc, MeshId, ProjectorDesc, SceneDesc, ShapeDesc, ShapeGeometry};
 use super::diag::{Diagnostic, Diagnostics, Span};
 use super::medium::VolumeDesc;
 use glam::DMat4;
@@ -8,7 +9,7 @@ use rayon::prelude::*;
 
 /// Checks `scene` and adds what is wrong to `out`: no sensor, no shapes, an empty film, a crop outside the film,
 /// vertices that are not finite, indices out of range and transforms that cannot be inverted are errors; a scene
-/// without light and triangles without area (which `prepared` leaves out) are warnings.
+/// without light, triangles without area (which `prepared` leaves out) and media with open boundaries are warnings.
 pub fn validate(scene: &SceneDesc, out: &mut Diagnostics) {
     sensors(scene, out);
     let all: Vec<&ShapeDesc> = scene.shapes.iter().chain(scene.groups.iter().flat_map(|g| &g.shapes)).collect();
@@ -32,6 +33,7 @@ pub fn validate(scene: &SceneDesc, out: &mut Diagnostics) {
     }
     for emitter in &scene.emitters {
         if let EmitterKind::Spot { to_world, .. }
+        | EmitterKind::Projector(ProjectorDesc { to_world, .. })
         | EmitterKind::Envmap { to_world, .. }
         | EmitterKind::SunSky { to_world, .. } = &emitter.kind
         {
@@ -46,6 +48,7 @@ pub fn validate(scene: &SceneDesc, out: &mut Diagnostics) {
         }
     }
     meshes(scene, &all, out);
+    boundaries::media(scene, out);
 }
 
 fn sensors(scene: &SceneDesc, out: &mut Diagnostics) {
@@ -209,7 +212,11 @@ mod tests {
                 name: None,
                 span: None,
             }],
-            emitters: vec![EmitterDesc { kind: EmitterKind::Constant { radiance: Rgb::WHITE }, span: None }],
+            emitters: vec![EmitterDesc {
+                kind: EmitterKind::Constant { radiance: Rgb::WHITE },
+                sampling_weight: 1.0,
+                span: None,
+            }],
             ..SceneDesc::default()
         }
     }

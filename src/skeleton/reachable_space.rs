@@ -61,6 +61,7 @@ pub fn places(scene: &PreparedScene) -> Places {
         }
         Light::Point(l) => vec![(l.position(), Vec3::ZERO)],
         Light::Spot(l) => vec![(l.position(), Vec3::ZERO)],
+        Light::Projector(l) => vec![(l.position(), Vec3::ZERO)],
         Light::Directional(_) | Light::Environment(_) => vec![],
     }));
     Places { ends, seen }

@@ -43,6 +43,10 @@ fn placed(mut desc: SceneDesc, scale: f64, offset: DVec3) -> SceneDesc {
                 move_frame(to_world);
                 *intensity *= (scale * scale) as f32;
             }
+            EmitterKind::Projector(projector) => {
+                move_frame(&mut projector.to_world);
+                projector.scale *= (scale * scale) as f32;
+            }
             EmitterKind::Directional { .. }
             | EmitterKind::Constant { .. }
             | EmitterKind::Envmap { .. }

@@ -166,3 +166,23 @@ fn none_one_and_many_coincident_lights() {
     let total: f32 = set.iter().map(|(id, _)| set.pmf_light_from(Vec3::ZERO, None, id).0).sum();
     assert!((total - 1.0).abs() < 1e-3, "{total}");
 }
+
+#[test]
+fn weights_multiply_the_probability_of_being_sampled() {
+    let point = |power: f32, x: f64| Light::Point(PointLight::new(DVec3::X * x, Rgb::grey(power), DVec3::ZERO));
+    let from = Vec3::new(0.0, 10.0, 0.0);
+    // Few lights are sampled by power, more by a tree.
+    for count in [3, 8] {
+        let lights: Vec<Light> = (0..count).map(|i| point(1.0, f64::from(i) * 1e-3)).collect();
+        let weights: Vec<f32> = (0..count).map(|i| [1.0, 4.0, 0.0][i as usize % 3]).collect();
+        let set = LightSet::weighted(lights, &weights);
+        let total: f32 = weights.iter().sum();
+        for (id, _) in set.iter() {
+            let expected = weights[id.index()] / total;
+            let (by_power, from_there) = (set.pmf_light(id).0, set.pmf_light_from(from, None, id).0);
+            assert!((by_power - expected).abs() < 1e-6, "{count} {id:?}: {by_power} {expected}");
+            assert!((from_there - expected).abs() < 0.02, "{count} {id:?}: {from_there} {expected}");
+            assert_eq!(from_there == 0.0, expected == 0.0);
+        }
+    }
+}

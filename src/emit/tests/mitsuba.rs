@@ -1,7 +1,7 @@
 //! Values recorded from Mitsuba 3.9.1, scalar_rgb.
 
 use super::*;
-use crate::scene::{FovAxis, SensorDesc};
+use crate::scene::SensorDesc;
 
 type Columns = [[f64; 4]; 4];
 
@@ -141,6 +141,58 @@ fn spot_falloff() {
     ];
     let spot = SpotLight::new(DMat4::from_cols_array_2d(&to_world), Rgb::new(3.0, 2.0, 1.0), 35.0, 20.0, DVec3::ZERO).unwrap();
     compare("spot", |p| spot.sample_direct(p).map_or(Rgb::BLACK, |s| s.radiance), &cases, 2e-4);
+}
+
+/// A picture of 4 x 2 pixels, looked up without interpolation.
+#[derive(Debug)]
+struct Mosaic;
+
+impl RadianceTexture for Mosaic {
+    fn at(&self, uv: Vec2) -> Rgb {
+        let (x, y) = ((uv.x * 4.0).floor().clamp(0.0, 3.0), (uv.y * 2.0).floor().clamp(0.0, 1.0));
+        Rgb::new(0.1 + 0.2 * x, 0.2 + 0.5 * y, 0.3)
+    }
+    fn mean(&self) -> Rgb {
+        Rgb::new(0.4, 0.45, 0.3)
+    }
+}
+
+/// `projector`, fov 50°, scale 2: `sample_direction` seen from points.
+#[test]
+fn projected_pictures() {
+    let to_world: Columns = [
+        [0.0, -0.2425356, -0.9701425, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, -0.9701425, 0.2425356, 0.0],
+        [1.0, 2.0, 3.0, 1.0],
+    ];
+    let x = [
+        ([1.5, 0.0, 3.5], [0.0, 0.0, 0.0]),
+        ([1.2, -0.1, 4.2], [0.8456588, 0.2416168, 0.3624252]),
+        ([0.6, 0.2, 2.9], [0.2272246, 1.590572, 0.6816737]),
+        ([3.8, 0.0, 3.5], [0.0, 0.0, 0.0]),
+        ([1.0, 4.0, 3.0], [0.0, 0.0, 0.0]),
+    ];
+    let y = [
+        ([1.5, 0.0, 3.5], [0.7606286, 0.3042514, 0.4563772]),
+        ([0.2, -0.1, 3.4], [0.4425325, 1.032576, 0.4425325]),
+        ([1.2, -0.1, 4.2], [0.604042, 0.2416168, 0.3624252]),
+        ([0.6, 0.2, 2.9], [0.6816737, 1.590572, 0.6816737]),
+    ];
+    let diagonal = [
+        ([1.2, -0.1, 4.2], [0.8456588, 0.2416168, 0.3624252]),
+        ([0.2, -0.1, 3.4], [0.0, 0.0, 0.0]),
+        ([0.6, 0.2, 2.9], [0.0, 0.0, 0.0]),
+    ];
+    let cases = [(FovAxis::X, &x[..]), (FovAxis::Y, &y[..]), (FovAxis::Diagonal, &diagonal[..])];
+    for (fov_axis, cases) in cases {
+        let to_world = DMat4::from_cols_array_2d(&to_world);
+        let irradiance = ColorDesc::Constant(Rgb::WHITE);
+        let desc = ProjectorDesc { to_world, irradiance, scale: 2.0, fov: 50.0, fov_axis };
+        let projector = Projector::new(&desc, Arc::new(Mosaic), 2.0, DVec3::ZERO).unwrap();
+        let seen = |p| projector.sample_direct(p).map_or(Rgb::BLACK, |s| s.radiance);
+        compare("projector", seen, cases, 2e-4);
+    }
 }
 
 /// `sunsky` with the sky at half and the sun at twice its strength, `to_world` a rotation by −90° around x (so +y is

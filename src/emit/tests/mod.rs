@@ -12,7 +12,7 @@ use crate::image::{Image, Pixels};
 use crate::math::hash::HashRng;
 use crate::math::{DMat4, DVec3, Rgb, Vec2, Vec3};
 use crate::ray::{RoundShape, SurfaceMask};
-use crate::scene::RoundKind;
+use crate::scene::{ColorDesc, FovAxis, ProjectorDesc, RoundKind};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::Arc;
 
@@ -119,6 +119,7 @@ fn all_lights() -> Vec<(&'static str, Light)> {
         ("point", Light::Point(PointLight::new(DVec3::new(0.3, 0.2, 1.1), Rgb::new(1.0, 2.0, 3.0), DVec3::ZERO))),
         ("spot with a texture", Light::Spot(Box::new(spot.clone().with_projection(projection)))),
         ("spot", Light::Spot(Box::new(spot))),
+        ("projector", Light::Projector(Box::new(projector(Arc::new(Ramp), FovAxis::X, 1.5)))),
         ("directional", Light::Directional(directional)),
         ("constant", environment(Environment::Constant(Rgb::new(0.2, 0.4, 0.8)))),
         ("map", environment(map(7, 5))),
@@ -128,6 +129,12 @@ fn all_lights() -> Vec<(&'static str, Light)> {
         ("sun", environment(sun_sky(0.0, 1.0))),
         ("sun and sky", environment(sun_sky(1.0, 0.001))),
     ]
+}
+
+fn projector(picture: Arc<dyn RadianceTexture>, fov_axis: FovAxis, aspect: f64) -> Projector {
+    let irradiance = ColorDesc::Constant(Rgb::WHITE);
+    let desc = ProjectorDesc { to_world: tilted(), irradiance, scale: 2.0, fov: 50.0, fov_axis };
+    Projector::new(&desc, picture, aspect, DVec3::new(0.3, 0.1, 0.0)).unwrap()
 }
 
 fn round(kind: RoundKind, textured: bool) -> Light {

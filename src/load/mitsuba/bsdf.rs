@@ -4,24 +4,30 @@ use super::conductors;
 use super::objects::{Builder, FORCE};
 use super::props::Props;
 use super::spectrum::Purpose::Reflectance;
+use super::values;
 use crate::math::Rgb;
 use crate::scene::diag::{Diagnostic, nearest};
 use crate::scene::{
-    BK7, BsdfDesc, BsdfId, BsdfKind, CoatingDesc, ColorDesc, ComplexIor, Distribution, MODELS, ParamSource, Roughness,
-    ScalarDesc, TextureDesc, TextureId, WardVariant,
+    BK7, BsdfDesc, BsdfId, BsdfKind, BsdfModel, CoatingDesc, ColorDesc, ComplexIor, DiffuseParams, Distribution,
+    MODELS, ParamSource, Roughness, ScalarDesc, TextureDesc, TextureId, WardVariant,
 };
 
 /// Reads a plugin that combines or modifies other materials.
 type ReadOperator = fn(&mut Builder<'_>, &Props<'_>) -> Option<BsdfKind>;
 
+/// Most materials of a mixture.
+const MAX_MIXED: usize = 8;
+
 /// Plugins that combine or modify other materials.
-const OPERATORS: [(&str, ReadOperator); 7] = [
+const OPERATORS: [(&str, ReadOperator); 9] = [
     ("twosided", two_sided),
     ("mask", mask),
     ("bumpmap", bump_map),
     ("normalmap", normal_map),
     ("blendbsdf", blend),
+    ("mixturebsdf", mixture),
     ("coating", coating),
+    ("polarizer", polarizer),
     ("null", |_, _| Some(BsdfKind::Null)),
 ];
 
@@ -105,6 +111,12 @@ impl Builder<'_> {
         replaced.replacement
     }
 
+    /// A material that a plugin needs inside of its own.
+    fn unnamed_bsdf(&mut self, kind: BsdfKind, props: &Props<'_>) -> BsdfId {
+        self.scene.bsdfs.push(BsdfDesc { name: None, kind, span: Some(props.span()) });
+        BsdfId((self.scene.bsdfs.len() - 1) as u32)
+    }
+
     /// Nested materials, named or not, in the order of the file.
     fn nested(&mut self, p: &Props<'_>, wanted: std::ops::RangeInclusive<usize>) -> Option<Vec<BsdfId>> {
         let objects = p.objects();
@@ -112,7 +124,8 @@ impl Builder<'_> {
             let expected = match (*wanted.start(), *wanted.end()) {
                 (1, 1) => "one nested <bsdf>".to_owned(),
                 (a, b) if a == b => format!("{a} nested <bsdf>s"),
-                (a, b) => format!("{a} or {b} nested <bsdf>s"),
+                (a, b) if a + 1 == b => format!("{a} or {b} nested <bsdf>s"),
+                (a, b) => format!("{a} to {b} nested <bsdf>s"),
             };
             let message = format!("`{}` needs {expected}, found {}", p.plugin, objects.len());
             self.push(
@@ -176,6 +189,53 @@ fn blend(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
     Some(BsdfKind::Blend { weight, a: nested[0], b: nested[1] })
 }
 
+/// A mixture of Mitsuba 0.6, as nested blends of two: Σ wᵢ fᵢ. Light is lost where the weights do not reach one.
+fn mixture(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
+    let nested = builder.nested(props, 1..=MAX_MIXED)?;
+    let weights = mixture_weights(props, nested.len())?;
+    let black = BsdfModel::Diffuse(DiffuseParams { reflectance: ColorDesc::Constant(Rgb::BLACK) });
+    // The mixture of the last materials, of the sum `total` of their weights, scaled to a sum of one.
+    let (mut total, mut rest) =
+        (1.0 - weights.iter().sum::<f64>().min(1.0), builder.unnamed_bsdf(BsdfKind::Model(black), props));
+    for (i, (&weight, &a)) in weights.iter().zip(&nested).enumerate().rev() {
+        let fraction = total / (total + weight);
+        total += weight;
+        let weight = ScalarDesc::Constant(if fraction.is_nan() { 0.0 } else { fraction as f32 });
+        let blend = BsdfKind::Blend { weight, a, b: rest };
+        if i == 0 {
+            return Some(blend);
+        }
+        rest = builder.unnamed_bsdf(blend, props);
+    }
+    None
+}
+
+/// The property `weights` of a mixture of `count` materials; with a sum above one, they are scaled to a sum of one.
+fn mixture_weights(props: &Props<'_>, count: usize) -> Option<Vec<f64>> {
+    let Some(node) = props.get("weights") else {
+        props.error("scene::missing-property", "`mixturebsdf` needs the property `weights`");
+        return None;
+    };
+    let text = props.string("weights")?;
+    let refused = |message: String| props.bad_value(node, "value", message, "numbers that are not negative");
+    let weights = match values::numbers(&text.replace(';', " ")) {
+        Ok(weights) => weights,
+        Err(message) => {
+            refused(message);
+            return None;
+        }
+    };
+    let total: f64 = weights.iter().sum();
+    if weights.len() != count {
+        refused(format!("{} weights for {count} materials", weights.len()));
+    } else if weights.iter().any(|weight| *weight < 0.0) || total <= 0.0 {
+        refused("weights of a mixture are not negative, and not all zero".into());
+    } else {
+        return Some(weights.iter().map(|weight| weight / total.max(1.0)).collect());
+    }
+    None
+}
+
 fn coating(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
     let eta = builder.relative_ior(props, BK7);
     let sigma_a = builder.color(props, "sigma_a", 0.0, Reflectance);
@@ -188,6 +248,22 @@ fn coating(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
     let specular_reflectance = builder.reflectance(props, "specular_reflectance", 1.0);
     let nested = builder.nested(props, 1..=1)?[0];
     Some(BsdfKind::Coating(CoatingDesc { nested, eta, sigma_a, thickness, specular_reflectance }))
+}
+
+/// A polarizer without polarization: as in Mitsuba's unpolarized variants it passes half of all light.
+fn polarizer(builder: &mut Builder<'_>, props: &Props<'_>) -> Option<BsdfKind> {
+    let message =
+        "light has no polarization here: a `polarizer` passes half of all light, as in Mitsuba's `scalar_rgb`";
+    let d = Diagnostic::warning("scene::replaced-plugin", message).at(props.element().span_of("type"));
+    builder.push(d.changing_picture());
+    props.ignore(&["theta", "polarizing"]);
+    let ScalarDesc::Constant(transmittance) = builder.scalar(props, "transmittance", 1.0) else {
+        props.unsupported("a `polarizer` with a texture as its `transmittance` is not supported");
+        return None;
+    };
+    let black = BsdfModel::Diffuse(DiffuseParams { reflectance: ColorDesc::Constant(Rgb::BLACK) });
+    let nested = builder.unnamed_bsdf(BsdfKind::Model(black), props);
+    Some(BsdfKind::Mask { opacity: ScalarDesc::Constant(1.0 - 0.5 * transmittance), nested })
 }
 
 /// The properties of a plugin as parameters of a scattering model.

@@ -2,15 +2,17 @@
 
 use super::objects::Builder;
 use super::props::Props;
+use super::sensor::field_of_view;
 use super::spectrum::Purpose::{Emission, Reflectance};
 use super::sun;
 use super::texture::legacy_gamma;
 use crate::load::assets::ImageUse;
 use crate::scene::diag::Diagnostic;
-use crate::scene::{ColorDesc, EmitterDesc, EmitterKind, TextureId};
+use crate::scene::{ColorDesc, EmitterDesc, EmitterKind, ProjectorDesc, TextureId};
 use glam::{DMat4, DVec3};
 
-const PLUGINS: [&str; 9] = ["area", "point", "spot", "directional", "constant", "envmap", "sunsky", "sun", "sky"];
+const PLUGINS: [&str; 10] =
+    ["area", "point", "spot", "projector", "directional", "constant", "envmap", "sunsky", "sun", "sky"];
 
 impl Builder<'_> {
     /// An `<emitter>` that stands in the scene itself.
@@ -21,16 +23,20 @@ impl Builder<'_> {
         }
         let Some(props) = self.props(node) else { return };
         let Some(kind) = self.emitter_kind(&props) else { return };
-        let is_delta =
-            matches!(kind, EmitterKind::Point { .. } | EmitterKind::Spot { .. } | EmitterKind::Directional { .. });
-        // How often a light is chosen is the integrators' own business. Mitsuba never chooses one of weight 0, and only
-        // lights that rays can meet shine all the same.
-        if is_delta && self.sampling_weight(&props) == 0.0 {
+        let is_delta = matches!(
+            kind,
+            EmitterKind::Point { .. }
+                | EmitterKind::Spot { .. }
+                | EmitterKind::Projector(_)
+                | EmitterKind::Directional { .. }
+        );
+        let sampling_weight = self.sampling_weight(&props);
+        // Mitsuba never chooses a light of weight 0, and only lights that rays can meet shine all the same.
+        if is_delta && sampling_weight == 0.0 {
             let message = "a light without extent and with a `sampling_weight` of 0 is dark, as in Mitsuba";
             self.push(Diagnostic::warning("scene::dark-emitter", message).at(props.span()));
         } else {
-            self.sampling_weight(&props);
-            self.scene.emitters.push(EmitterDesc { kind, span: Some(props.span()) });
+            self.scene.emitters.push(EmitterDesc { kind, sampling_weight, span: Some(props.span()) });
         }
         self.check_media(&props);
         props.finish();
@@ -59,6 +65,7 @@ impl Builder<'_> {
                     texture: self.projected_texture(p, cutoff),
                 }
             }
+            "projector" => EmitterKind::Projector(self.projector(p, to_world(p))),
             "directional" => {
                 let direction = p.vector("direction").unwrap_or_else(|| to_world(p).transform_vector3(DVec3::Z));
                 let Some(direction) = direction.try_normalize() else {
@@ -96,15 +103,25 @@ impl Builder<'_> {
         Some(texture)
     }
 
+    fn projector(&mut self, p: &Props<'_>, to_world: DMat4) -> ProjectorDesc {
+        if !p.has("irradiance") {
+            p.error("scene::missing-property", "a `projector` needs the texture `irradiance`");
+        }
+        let irradiance = self.color(p, "irradiance", 1.0, Emission);
+        self.require_pictures(irradiance, &p.span());
+        let (fov, fov_axis) = field_of_view(p);
+        ProjectorDesc { to_world, irradiance, scale: p.float_or("scale", 1.0) as f32, fov, fov_axis }
+    }
+
     /// The sampling weight of an emitter, which must not be negative.
-    pub(super) fn sampling_weight(&self, p: &Props<'_>) -> f64 {
+    pub(super) fn sampling_weight(&self, p: &Props<'_>) -> f32 {
         let weight = p.float_or("sampling_weight", 1.0);
         if weight < 0.0
             && let Some(node) = p.get("sampling_weight")
         {
             p.bad_value(node, "value", format!("a `sampling_weight` of {weight}"), "a number that is not negative");
         }
-        weight
+        weight as f32
     }
 
     fn sun_sky(&mut self, p: &Props<'_>, to_world: DMat4) -> EmitterKind {

@@ -161,7 +161,7 @@ fn either(p: &Props<'_>, first: &'static str, second: &'static str) -> &'static 
 }
 
 /// `fov` in degrees with its axis, or `focal_length` in mm on 35 mm film, which stands for a diagonal angle.
-fn field_of_view(p: &Props<'_>) -> (f64, FovAxis) {
+pub(super) fn field_of_view(p: &Props<'_>) -> (f64, FovAxis) {
     let axes = [
         ("x", FovAxis::X),
         ("y", FovAxis::Y),

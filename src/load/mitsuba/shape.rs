@@ -15,8 +15,8 @@ use crate::scene::{
 };
 use glam::{DMat4, DVec3};
 
-const PLUGINS: [&str; 10] =
-    ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance"];
+const PLUGINS: [&str; 11] =
+    ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance", "merge"];
 
 /// A surface of a shape, as long as its file is not read.
 enum Source {
@@ -65,6 +65,12 @@ impl Builder<'_> {
             "shapegroup" => {
                 self.group(node, node);
             }
+            "merge" => {
+                for member in self.members(&p) {
+                    self.shape(member);
+                }
+                p.finish();
+            }
             "instance" => {
                 if let Some(instance) = self.instance(&p) {
                     self.scene.instances.push(instance);
@@ -103,16 +109,7 @@ impl Builder<'_> {
         let built = self.guarded(object, from, |b| {
             let p = b.props(object)?;
             let mut group = GroupDesc::default();
-            for child in p.objects() {
-                let Some(child) = b.resolve(child) else { continue };
-                if b.node(child).tag != "shape" {
-                    let d = Diagnostic::error(
-                        "scene::misplaced-element",
-                        format!("a <{}> has no place in a shapegroup", b.node(child).tag),
-                    );
-                    b.push(d.at(b.node(child).span.clone()).label("expected a <shape>"));
-                    continue;
-                }
+            for child in b.members(&p) {
                 let Some(shape) = b.props(child) else { continue };
                 if matches!(shape.plugin, "shapegroup" | "instance") {
                     shape.error("scene::nested-shape", format!("a shapegroup cannot hold a `{}`", shape.plugin));
@@ -131,6 +128,31 @@ impl Builder<'_> {
         });
         self.groups.insert(object, built);
         built
+    }
+
+    /// The shapes inside of a shape that holds others; those inside of a `merge` in their places.
+    fn members(&mut self, p: &Props<'_>) -> Vec<usize> {
+        let mut found = vec![];
+        for from in p.objects() {
+            let Some(object) = self.resolve(from) else { continue };
+            let node = self.node(object);
+            if node.tag != "shape" {
+                let message = format!("a <{}> has no place in a `{}`", node.tag, p.plugin);
+                let d = Diagnostic::error("scene::misplaced-element", message);
+                self.push(d.at(node.span.clone()).label("expected a <shape>"));
+            } else if node.attr("type").is_some_and(|a| a.value == "merge") {
+                let inside = self.guarded(object, from, |b| {
+                    let p = b.props(object)?;
+                    let inside = b.members(&p);
+                    p.finish();
+                    Some(inside)
+                });
+                found.extend(inside.unwrap_or_default());
+            } else {
+                found.push(object);
+            }
+        }
+        found
     }
 
     /// Any shape that is a surface.
@@ -253,10 +275,10 @@ impl Builder<'_> {
         }
         let radiance = self.color(&p, "radiance", 1.0, Emission);
         self.require_pictures(radiance, &p.span());
-        self.sampling_weight(&p);
+        let sampling_weight = self.sampling_weight(&p);
         self.check_media(&p);
         p.finish();
-        Some(AreaEmission { radiance, span: Some(p.span()) })
+        Some(AreaEmission { radiance, sampling_weight, span: Some(p.span()) })
     }
 }
 

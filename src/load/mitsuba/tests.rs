@@ -76,6 +76,10 @@ const MISTAKES: &[(&str, &[&str])] = &[
     (r#"<bsdf type="roughconductor"><string name="distribution" value="¦gxg"/></bsdf>"#, &["scene::bad-value"]),
     (r#"¦<bsdf type="twosided"/>"#, &["scene::nested-bsdf"]),
     (r#"¦<bsdf type="blendbsdf"><bsdf type="diffuse"/></bsdf>"#, &["scene::nested-bsdf"]),
+    (r#"¦<bsdf type="mixturebsdf"><bsdf type="diffuse"/></bsdf>"#, &["scene::missing-property"]),
+    (r#"<bsdf type="mixturebsdf"><string name="weights" value="¦0.5 0.2"/><bsdf type="diffuse"/></bsdf>"#, &["scene::bad-value"]),
+    (r#"<bsdf type="mixturebsdf"><string name="weights" value="¦-0.5"/><bsdf type="diffuse"/></bsdf>"#, &["scene::bad-value"]),
+    (r#"<bsdf type="mixturebsdf"><string name="weights" value="¦half"/><bsdf type="diffuse"/></bsdf>"#, &["scene::bad-value"]),
     (r#"<shape type="cube"><ref id="¦wal"/></shape><bsdf type="diffuse" id="wall"/>"#, &["scene::undefined-reference"]),
     (r#"<bsdf type="diffuse" id="a"/>
 <bsdf type="diffuse" id="¦a"/>"#, &["scene::duplicate-id"]),

@@ -5,6 +5,7 @@ use super::props::Props;
 use super::spectrum::Purpose::Reflectance;
 use crate::load::assets::ImageUse;
 use crate::load::mesh::MeshColors;
+use crate::math::Rgb;
 use crate::scene::diag::Diagnostic;
 use crate::scene::{ColorDesc, Span, TextureDesc, TextureFilter, TextureId, WrapMode};
 use std::collections::HashSet;
@@ -58,13 +59,28 @@ impl Builder<'_> {
                 Some(TextureDesc::Checkerboard { color0, color1, to_uv: to_uv(p) })
             }
             "mesh_attribute" => Some(mesh_attribute(p)),
+            "rawconstant" => self.raw_constant(p),
             // 0.6: a texture times a number.
             "scale" => self.scaled(p),
             _ => {
-                self.unknown_plugin(p, &["bitmap", "checkerboard", "mesh_attribute", "scale"]);
+                self.unknown_plugin(p, &["bitmap", "checkerboard", "mesh_attribute", "rawconstant", "scale"]);
                 None
             }
         }
+    }
+
+    /// A constant without conversion: a checkerboard of one colour.
+    fn raw_constant(&mut self, p: &Props<'_>) -> Option<TextureDesc> {
+        let Some(node) = p.get("value") else {
+            p.error("scene::missing-property", "a `rawconstant` needs the property `value`");
+            return None;
+        };
+        let color = match node.tag.as_str() {
+            "vector" | "point" => p.vector("value").map(|v| Rgb::new(v.x as f32, v.y as f32, v.z as f32)),
+            _ => self.constant(node, Reflectance, "a number or a vector"),
+        };
+        let color = ColorDesc::Constant(color?);
+        Some(TextureDesc::Checkerboard { color0: color, color1: color, to_uv: to_uv(p) })
     }
 
     /// Makes it an error if a picture of a texture that lights the scene cannot be read. `at` is the light.

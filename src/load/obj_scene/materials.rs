@@ -50,7 +50,7 @@ impl Model {
             None => ColorDesc::Constant(mtl.emission.unwrap_or(Rgb::BLACK)),
         };
         let emits = emission != ColorDesc::Constant(Rgb::BLACK);
-        let emission = emits.then_some(AreaEmission { radiance: emission, span: span.clone() });
+        let emission = emits.then_some(AreaEmission { radiance: emission, sampling_weight: 1.0, span: span.clone() });
         let name = Some(mtl.name.as_str());
         let dissolve = mtl.opacity();
         let refracts = mtl.ior.is_some_and(|i| i > 1.0);

@@ -8,6 +8,7 @@ use super::features::Features;
 use super::model::{LobeSample, Model, TextureBinder, features_of};
 use super::phong::Phong;
 use super::plastic::Plastic;
+use super::pplastic::PolarizedPlastic;
 use super::principled::Principled;
 use super::rough_dielectric::RoughDielectric;
 use super::rough_plastic::RoughPlastic;

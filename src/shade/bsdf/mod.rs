@@ -19,6 +19,7 @@ mod nested_frame;
 mod node;
 mod phong;
 mod plastic;
+mod pplastic;
 mod principled;
 mod rough_dielectric;
 mod rough_plastic;

@@ -44,3 +44,31 @@ fn bright_reflectances_are_scaled_down() {
     let ColorDesc::Constant(c) = p.reflectance else { panic!() };
     assert!((c.r - 0.99).abs() < 1e-6 && (c.g - 0.495).abs() < 1e-6 && c.b == 0.0, "{c:?}");
 }
+
+/// The albedo of blends of Lambertian materials.
+fn diffuse_albedo(scene: &SceneDesc, id: BsdfId) -> f32 {
+    match scene.bsdfs[id.index()].kind {
+        BsdfKind::Model(BsdfModel::Diffuse(DiffuseParams { reflectance: ColorDesc::Constant(c) })) => c.g,
+        BsdfKind::Blend { weight: ScalarDesc::Constant(w), a, b } => {
+            (1.0 - w) * diffuse_albedo(scene, a) + w * diffuse_albedo(scene, b)
+        }
+        ref other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn mixtures_weigh_each_of_their_materials() {
+    let grey = |v: f64| format!("<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"{v}\"/></bsdf>");
+    let nested = [0.2, 0.4, 0.8].map(grey).concat();
+    // Light is lost where the weights do not reach one; weights beyond one are scaled.
+    let mixtures =
+        [("0.5, 0.25, 0.125", 0.3), ("0.5;0.25;0.25", 0.4), ("0 0 0.5", 0.4), ("2 1 1", 0.4), ("0 1 0", 0.4)];
+    for (weights, expected) in mixtures {
+        let scene = good(&format!(
+            "<bsdf type=\"mixturebsdf\" id=\"mixed\"><string name=\"weights\" value=\"{weights}\"/>{nested}</bsdf>"
+        ));
+        let id = scene.bsdfs.iter().position(|bsdf| bsdf.name.as_deref() == Some("mixed")).unwrap();
+        let albedo = diffuse_albedo(&scene, BsdfId(id as u32));
+        assert!((albedo - expected).abs() < 1e-6, "{weights}: {albedo}");
+    }
+}

@@ -231,6 +231,15 @@ pub static ZOO: LazyLock<Zoo> = LazyLock::new(|| {
             nonlinear: true,
         },
     );
+    z.name(
+        "pplastic",
+        PolarizedPlasticParams {
+            roughness: rough(Ggx, 0.3, 0.15, true),
+            eta: 1.6,
+            diffuse_reflectance: brown,
+            specular_reflectance: tints.0,
+        },
+    );
     z.name("principled_plain", principled(|p| p.roughness = num(0.4)));
     z.name(
         "principled_opaque",
