@@ -27,6 +27,7 @@ mod resampling;
 mod round;
 mod scale;
 mod scene_files;
+mod shading_normals;
 mod stress;
 mod support;
 mod techniques;

@@ -1,11 +1,12 @@
 //! Numbers at the edges of what people use, for every registered integrator: every sample is finite, and right where
 //! the right value is known.
 
-use crate::support::pictures::{Picture, SIGNIFICANCE, chance, parse, prepare, takes, unbiased};
+use crate::support::pictures::{Picture, SIGNIFICANCE, chance, parse, parse_beside, prepare, takes, unbiased};
 use lightsieve::integrators::{IntegratorSpec, Params, REGISTRY};
 use lightsieve::prepared::PreparedScene;
 use lightsieve::ray::Backend;
 use lightsieve::render::Estimator;
+use std::fmt::Write;
 
 /// Samples per pixel of each of the renders of a picture.
 const SPP: u64 = 4;
@@ -156,6 +157,111 @@ fn extreme_materials_and_shapes_are_finite() {
             let picture = Picture::render(spec, &scene, &[("max_depth", "6")], 1, 1);
             assert!(picture.whole.0.is_finite() && picture.whole.0 >= 0.0, "{}: {more}", spec.name);
         }
+    }
+}
+
+#[test]
+fn sampling_weights_change_noise_alone() {
+    let lamp = |weight: &str| {
+        format!(
+            "<shape type=\"rectangle\"><transform name=\"to_world\"><scale value=\"0.5\"/><translate z=\"-0.9\"/>\
+            </transform><ref id=\"grey\"/><emitter type=\"area\"><rgb name=\"radiance\" value=\"2\"/>{weight}</emitter></shape>"
+        )
+    };
+    let weight = |value: f64| format!("<float name=\"sampling_weight\" value=\"{value}\"/>");
+    let expected = Box { more: lamp(""), ..Box::default() }.prepared();
+    for value in [5.0, 0.0] {
+        let scene = Box { more: lamp(&weight(value)), ..Box::default() }.prepared();
+        // Light that is never sampled leaves no light sub-path.
+        for spec in unbiased().filter(|spec| value > 0.0 || spec.name != "light") {
+            let what = format!("{}: weight {value}", spec.name);
+            assert_same_light(&render(spec, &scene, 1), &render(spec, &expected, 200), 1.0, 0.01, &what);
+        }
+    }
+}
+
+/// A square emitter of 100,352 triangles, as an OBJ file, in the plane z = 0 from -1 to 1.
+fn subdivided_square() -> String {
+    const N: usize = 224;
+    let mut obj = String::new();
+    for i in 0..=N {
+        for j in 0..=N {
+            let at = |k: usize| 2.0 * k as f64 / N as f64 - 1.0;
+            writeln!(obj, "v {} {} 0", at(j), at(i)).unwrap();
+        }
+    }
+    for i in 0..N {
+        for j in 0..N {
+            let at = |i: usize, j: usize| i * (N + 1) + j + 1;
+            writeln!(obj, "f {} {} {} {}", at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)).unwrap();
+        }
+    }
+    obj
+}
+
+#[test]
+fn a_hundred_thousand_lights() {
+    // The lamp of the box hangs a little below it and hides it, unless it is as dark as here.
+    let lamp = "<shape type=\"obj\"><string name=\"filename\" value=\"lamp.obj\"/><transform name=\"to_world\">\
+        <scale value=\"0.4\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.8\"/></transform>\
+        <ref id=\"grey\"/><emitter type=\"area\"><rgb name=\"radiance\" value=\"5\"/></emitter></shape>";
+    let one = "<shape type=\"rectangle\"><transform name=\"to_world\">\
+        <scale value=\"0.4\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.8\"/></transform>\
+        <ref id=\"grey\"/><emitter type=\"area\"><rgb name=\"radiance\" value=\"5\"/></emitter></shape>";
+    let scene = |more: &str, files: &[(&str, &str)]| {
+        let xml = Box { radiance: 1e-3, more: more.into(), ..Box::default() }.xml();
+        prepare(parse(&xml, files), Backend::default_available(), None)
+    };
+    let (many, one) = (scene(lamp, &[("lamp.obj", &subdivided_square())]), scene(one, &[]));
+    assert!(many.lights.len() > 100_000);
+    for spec in unbiased() {
+        let what = format!("{}: many lights", spec.name);
+        assert_same_light(&render(spec, &many, 1), &render(spec, &one, 200), 1.0, 0.01, &what);
+    }
+}
+
+#[test]
+fn a_texel_of_a_million() {
+    // A sky with a texel a million times as bright as the others, over a floor; its mean is known by path tracing.
+    let width = 16;
+    let mut sky = format!("PF\n{width} 8\n-1.0\n").into_bytes();
+    for texel in 0..width * 8 {
+        let value: f32 = if texel == 6 * width + 5 { 1e6 } else { 1.0 };
+        (0..3).for_each(|_| sky.extend(value.to_le_bytes()));
+    }
+    let xml = "<sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/><transform name=\"to_world\">\
+        <lookat origin=\"0, 3, 3\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>\
+        <film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer name=\"height\" value=\"8\"/>\
+        <rfilter type=\"box\"/></film></sensor>\
+        <shape type=\"rectangle\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"-90\"/><scale value=\"2\"/></transform>\
+        <bsdf type=\"roughconductor\"><float name=\"alpha\" value=\"0.5\"/></bsdf></shape>\
+        <shape type=\"cube\"><transform name=\"to_world\"><scale value=\"0.4\"/><translate y=\"0.5\"/></transform>\
+        <bsdf type=\"diffuse\"/></shape>\
+        <emitter type=\"envmap\"><string name=\"filename\" value=\"sky.pfm\"/></emitter>";
+    let scene = prepare(parse_beside(xml, &[("sky.pfm", sky)]), Backend::default_available(), None);
+    let path = unbiased().find(|spec| spec.name == "path").unwrap();
+    let expected = Picture::render(path, &scene, &[("max_depth", "5")], 64, 1000);
+    assert!(expected.whole.0 > 100.0, "{:?}", expected.whole);
+    for spec in unbiased() {
+        let what = format!("{}: a texel of 1e6", spec.name);
+        assert_same_light(&render(spec, &scene, 1), &expected, 1.0, 0.01, &what);
+    }
+}
+
+#[test]
+fn cameras_in_glass() {
+    let ball = |from: &str| {
+        format!(
+            "<shape type=\"sphere\"><transform name=\"to_world\"><scale value=\"0.3\"/><translate z=\"{from}\"/></transform>\
+             <bsdf type=\"dielectric\"/></shape>"
+        )
+    };
+    let scene = Box { more: ball("0.6"), camera: 0.7, ..Box::default() }.prepared();
+    let path = unbiased().find(|spec| spec.name == "path").unwrap();
+    let expected = Picture::render(path, &scene, &[("max_depth", "8")], 256, 1000);
+    for spec in unbiased().filter(|spec| takes(spec, &scene)) {
+        let picture = Picture::render(spec, &scene, &[("max_depth", "8")], 64, 1);
+        assert_same_light(&picture, &expected, 1.0, 0.01, &format!("{}: a camera in glass", spec.name));
     }
 }
 
