@@ -74,7 +74,7 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
     let pool = Environment::new(None, args.quiet)?.pool;
     let report = pool.install(|| compare(&image, &reference)).map_err(Failure::input)?;
     let (a, b, _) = colours(&image, &reference).map_err(Failure::input)?;
-    let z = z_test((&a, variance.as_deref()), (&b, reference_variance.as_deref()));
+    let z = z_test(image.width as usize, (&a, variance.as_deref()), (&b, reference_variance.as_deref()));
     if let Some(path) = &args.error_image {
         let view = if args.signed { ErrorView::Signed } else { ErrorView::Relative };
         let pixels = error_image(&a, &b, view);
@@ -117,7 +117,13 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
         out!("  |z| > 2       {:<14.4}0.0455 for a normal distribution", z.beyond_2);
         out!("  |z| > 3       {:<14.4}0.0027 for a normal distribution", z.beyond_3);
         out!("  worst |z|     {:<14.2}{:.2} is passed by chance once in a thousand comparisons", z.worst, z.threshold);
-        out!("  whole picture {:<14.2}z of the mean", z.whole);
+        out!("  whole picture {:<14.2}z of the mean, if pixels are independent", z.whole);
+        if let Some(blocks) = z.blocks {
+            out!("  by blocks     {:<14.2}z of the mean, by the spread of blocks of 16 x 16 pixels", blocks.whole);
+            let formula =
+                "variance of blocks over that of independent pixels: larger where pixels share light sub-paths";
+            out!("  correlation   {:<14.2}{formula}", blocks.variance_ratio);
+        }
     }
     if let (Some(path), false) = (&args.error_image, args.signed) {
         out!("{}: d^2 / (r^2 + 0.01), 1e{} black to 1e{} white", path.display(), DECADES[0], DECADES[1]);

@@ -20,27 +20,72 @@ pub struct ZTest {
     pub threshold: f64,
     /// z of the mean of the picture; the channels of a pixel count as one, different pixels as independent.
     pub whole: f64,
+    /// The same question asked of blocks of pixels.
+    pub blocks: Option<BlockTest>,
+}
+
+/// What blocks of 16 × 16 pixels say, which may share light sub-paths: variances of single pixels leave out how they go
+/// together. None of pictures of fewer than two blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BlockTest {
+    /// Variance of the differences of blocks over the variance that independent pixels would give them. Where it is
+    /// above one, pixels are correlated (or expectations differ from block to block), and shares of |z| and z of the mean
+    /// say less than they seem to.
+    pub variance_ratio: f64,
+    /// z of the mean of the picture, with the spread of the blocks' differences as its error.
+    pub whole: f64,
 }
 
 /// Chance of an alarm where there is nothing.
 const SIGNIFICANCE: f64 = 1e-3;
 
-/// Tests two pictures with the variances of their pixels' means. A picture without variance is taken as exact. None if
-/// no value has a variance.
+/// Pixels along a side of a block.
+const BLOCK: usize = 16;
+
+/// Difference of a block of pixels.
+#[derive(Clone, Copy, Default)]
+struct BlockDifference {
+    pixels: f64,
+    /// Sum over pixels and channels.
+    difference: f64,
+    /// Its variance, if pixels are independent.
+    variance: f64,
+}
+
+impl BlockTest {
+    fn new(blocks: &[BlockDifference]) -> Option<BlockTest> {
+        let sum = |of: fn(&BlockDifference) -> f64| blocks.iter().map(of).sum::<f64>();
+        let (pixels, difference, variance) = (sum(|b| b.pixels), sum(|b| b.difference), sum(|b| b.variance));
+        let count = blocks.iter().filter(|block| block.pixels > 0.0).count() as f64;
+        let spread: f64 = blocks.iter().map(|b| (b.difference - difference / pixels * b.pixels).powi(2)).sum();
+        let spread = spread * count / (count - 1.0);
+        let whole = difference / spread.sqrt();
+        (count > 1.0 && whole.is_finite()).then(|| BlockTest { variance_ratio: spread / variance, whole })
+    }
+}
+
+/// Tests two pictures of the given width with the variances of their pixels' means. A picture without variance is taken
+/// as exact. None if no value has a variance.
 pub fn z_test(
+    width: usize,
     image: (&[[f64; 3]], Option<&[[f64; 3]]>),
     reference: (&[[f64; 3]], Option<&[[f64; 3]]>),
 ) -> Option<ZTest> {
     let variance = |v: Option<&[[f64; 3]]>, i: usize, c: usize| v.map_or(0.0, |v| v[i][c]);
     let (mut n, mut squares, mut beyond, mut worst) = (0u64, 0.0, [0u64; 2], 0.0_f64);
-    let (mut difference, mut spread) = (0.0, 0.0);
+    let columns = width.div_ceil(BLOCK);
+    let mut blocks = vec![BlockDifference::default(); columns * image.0.len().div_ceil(width.max(1)).div_ceil(BLOCK)];
     for (i, (a, b)) in image.0.iter().zip(reference.0).enumerate() {
         let v: [f64; 3] = std::array::from_fn(|c| variance(image.1, i, c) + variance(reference.1, i, c));
         if !a.iter().chain(b).chain(&v).all(|x| x.is_finite()) {
             continue;
         }
+        let block = &mut blocks[i / width / BLOCK * columns + i % width / BLOCK];
+        block.pixels += 1.0;
+        // Channels share their paths: their errors add up rather than their variances.
+        block.variance += v.iter().map(|v| v.sqrt()).sum::<f64>().powi(2);
         for c in 0..3 {
-            difference += a[c] - b[c];
+            block.difference += a[c] - b[c];
             if v[c] > 0.0 {
                 let z = (a[c] - b[c]).abs() / v[c].sqrt();
                 n += 1;
@@ -50,9 +95,9 @@ pub fn z_test(
                 worst = worst.max(z);
             }
         }
-        // Channels share their paths: their errors add up rather than their variances.
-        spread += v.iter().map(|v| v.sqrt()).sum::<f64>().powi(2);
     }
+    let difference: f64 = blocks.iter().map(|block| block.difference).sum();
+    let variance: f64 = blocks.iter().map(|block| block.variance).sum();
     (n > 0).then(|| ZTest {
         values: n,
         rms: (squares / n as f64).sqrt(),
@@ -60,7 +105,8 @@ pub fn z_test(
         beyond_3: beyond[1] as f64 / n as f64,
         worst,
         threshold: two_sided_quantile(1.0 - (1.0 - SIGNIFICANCE).powf(1.0 / n as f64)),
-        whole: difference / spread.sqrt(),
+        whole: difference / variance.sqrt(),
+        blocks: BlockTest::new(&blocks),
     })
 }
 
@@ -94,6 +140,7 @@ pub fn two_sided_quantile(p: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::hash::HashRng;
 
     #[test]
     fn quantiles_are_those_of_the_tables() {
@@ -106,12 +153,35 @@ mod tests {
     fn differences_are_counted_in_standard_errors() {
         let (image, reference) = (vec![[1.0, 2.0, 3.0]; 10], vec![[1.0, 2.0, 1.0]; 10]);
         let variance = vec![[0.25, 0.0, 0.25]; 10];
-        let z = z_test((&image, Some(&variance)), (&reference, None)).unwrap();
+        let z = z_test(5, (&image, Some(&variance)), (&reference, None)).unwrap();
+        assert!(z.blocks.is_none());
         assert_eq!((z.values, z.worst, z.beyond_2, z.beyond_3), (20, 4.0, 0.5, 0.5));
         assert!((z.rms - 8.0_f64.sqrt()).abs() < 1e-12);
         assert!((z.whole - 20.0 / 10.0_f64.sqrt()).abs() < 1e-12);
-        assert!(z_test((&image, None), (&reference, None)).is_none());
+        assert!(z_test(5, (&image, None), (&reference, None)).is_none());
         let nan = vec![[f64::NAN; 3]; 10];
-        assert!(z_test((&nan, Some(&variance)), (&reference, None)).is_none());
+        assert!(z_test(5, (&nan, Some(&variance)), (&reference, None)).is_none());
+    }
+
+    /// Pictures of normal errors: of each pixel by itself, and of blocks of 4 x 4 pixels.
+    #[test]
+    fn correlated_pixels_are_found() {
+        let (width, height) = (160, 96);
+        let mut rng = HashRng::from_key(11);
+        let mut normal = || (0..12).map(|_| f64::from(rng.next_f32())).sum::<f64>() - 6.0;
+        let shared: Vec<f64> = (0..width / 4 * (height / 4)).map(|_| normal()).collect();
+        let own: Vec<[f64; 3]> = (0..width * height).map(|_| [normal(); 3]).collect();
+        let common: Vec<[f64; 3]> =
+            (0..width * height).map(|i| [shared[i / width / 4 * (width / 4) + i % width / 4]; 3]).collect();
+        let exact = vec![[0.0; 3]; width * height];
+        let variance = vec![[1.0; 3]; width * height];
+        let test = |image: &[[f64; 3]]| z_test(width, (image, Some(&variance)), (&exact, None)).unwrap();
+        let (own, common) = (test(&own), test(&common));
+        let [own_blocks, common_blocks] = [own, common].map(|z| z.blocks.unwrap());
+        assert!((own_blocks.variance_ratio - 1.0).abs() < 0.6, "{own_blocks:?}");
+        assert!((own_blocks.whole / own.whole - 1.0).abs() < 0.3, "{own:?}");
+        // 16 pixels of one error each: sixteen times the variance, a quarter of z.
+        assert!((8.0..24.0).contains(&common_blocks.variance_ratio), "{common_blocks:?}");
+        assert!((common_blocks.whole / common.whole - 0.25).abs() < 0.08, "{common:?}");
     }
 }

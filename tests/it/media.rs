@@ -181,6 +181,45 @@ fn a_white_medium_in_a_white_sky_is_invisible() {
     }
 }
 
+/// Nor can one behind any boundary that absorbs nothing, with anything white in it.
+#[test]
+fn white_media_behind_any_boundary_are_invisible() {
+    let view = camera("0, 0.4, 4", "0, 0, 0", 40.0, "");
+    let ball = |radius: f64, bsdf: &str, content: &str| {
+        format!(r#"<shape type="sphere"><float name="radius" value="{radius}"/>{bsdf}{content}</shape>"#)
+    };
+    let bsdf = |kind: &str| format!(r#"<bsdf type="{kind}"/>"#);
+    let white = |sigma_t: &str, phase: &str| medium(INTERIOR, sigma_t, "1", phase);
+    let around = |sigma_t: &str| medium(r#" name="exterior""#, sigma_t, "1", "");
+    let to_world =
+        r#"<transform name="to_world"><translate x="-0.5" y="-0.5" z="-0.5"/><scale value="2.2"/></transform>"#;
+    let grid = format!(
+        r#"<medium type="heterogeneous" name="interior"><volume type="gridvolume" name="sigma_t"><string name="filename"
+        value="smoke.vol"/>{to_world}</volume><float name="scale" value="3"/><rgb name="albedo" value="1"/></medium>"#
+    );
+    let (fog, null) = (white("1.3", &hg(0.7)), bsdf("null"));
+    let cases = [
+        ("glass", ball(1.0, &bsdf("dielectric"), &white("1.3", r#"<phase type="rayleigh"/>"#))),
+        ("thin glass", ball(1.0, &bsdf("thindielectric"), &white("2", &hg(-0.4)))),
+        ("a grid in glass", ball(1.0, &bsdf("dielectric"), &grid)),
+        (
+            "a ball in a ball",
+            ball(1.0, &bsdf("dielectric"), &fog) + &ball(0.5, &null, &(white("5", "") + &around("1.3"))),
+        ),
+        ("a mirror in fog", ball(1.0, &null, &fog) + &ball(0.4, &bsdf("conductor"), &around("1.3"))),
+        ("a white wall in fog", ball(1.0, &null, &fog) + &ball(0.4, &diffuse("1"), &around("1.3"))),
+    ];
+    for (what, shapes) in cases {
+        let scene = scene(&[&view, &sky("1"), &shapes]);
+        // Without Russian roulette every path that comes to its end brings the whole light of the sky.
+        let params = [("max_depth", "-1"), ("rr_depth", "1000000"), ("fallback", "false")];
+        let picture = Picture::render(find("path").unwrap(), &scene, &params, 2 * SPP, 1);
+        picture.assert_agrees(&Picture::constant(1.0, 16), 1e-3, what);
+        let error = (picture.whole.0 - 1.0).abs();
+        assert!(error < 1e-3, "{what}: {error}");
+    }
+}
+
 #[test]
 fn pictures_are_as_bright_as_those_of_mitsuba() {
     for (what, scene) in scenes() {
