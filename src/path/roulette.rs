@@ -29,7 +29,7 @@ pub struct PathLimits {
 
 impl PathLimits {
     /// Probability to go on after vertex `index` with the scattering function `scatter`.
-    #[inline]
+    #[inline(always)]
     pub fn survival(&self, index: u32, scatter: &Scatter) -> f32 {
         if index < self.rr_depth { 1.0 } else { self.roulette_survival(scatter) }
     }

@@ -289,17 +289,17 @@ impl<'a> Scatter<'a> {
 }
 
 impl Scattering for Scatter<'_> {
-    #[inline]
+    #[inline(always)]
     fn eval(&self, wo: Vec3, wi: Vec3, mode: Transport) -> Rgb {
         self.bsdf().eval(wo, wi, mode)
     }
 
-    #[inline]
+    #[inline(always)]
     fn pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> SolidAnglePdf {
         self.bsdf().pdf(wo, wi, mode)
     }
 
-    #[inline]
+    #[inline(always)]
     fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, SolidAnglePdf) {
         self.bsdf().eval_and_pdf(wo, wi, mode)
     }

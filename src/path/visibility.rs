@@ -31,7 +31,7 @@ impl<T: Copy + Default> ShadowQueue<T> {
 
     /// Queues a segment with its payload; sends the packet off when it is full. `arrived` gets the payloads of segments
     /// that some light passes, with the transmittance of the segment.
-    #[inline]
+    #[inline(always)]
     pub fn push(&mut self, segment: &Segment, payload: T, tracer: &mut Tracer, arrived: impl FnMut(T, Transmittance)) {
         self.payloads[self.packet.len] = payload;
         self.packet.push(segment);
