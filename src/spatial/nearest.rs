@@ -27,7 +27,7 @@ const NO_POINT: u64 = (1 << BITS) - 1;
 /// Set in slots that have been filled.
 const KNOWN: u64 = 1 << 63;
 /// A slot without neighbours.
-const NOTHING: u64 = KNOWN | (1 << (BITS as usize * MAX_NEIGHBORS)) - 1;
+const NOTHING: u64 = KNOWN | ((1 << (BITS as usize * MAX_NEIGHBORS)) - 1);
 
 /// Which points are candidates, by distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -143,7 +143,7 @@ fn errors_in_units_of_their_spread_agree_with_numpy() {
     // With variances v = b²/12 of the picture and b²/64 of the reference; the threshold is scipy's norm.isf.
     let variance = |share: f64| colours(&picture(|x, y, c| bands(x, y, c) * bands(x, y, c) / share));
     let (image, reference) = (colours(&noisy_bands()), colours(&picture(bands)));
-    let z = z_test((&image, Some(&variance(12.0))), (&reference, Some(&variance(64.0)))).unwrap();
+    let z = z_test(WIDTH, (&image, Some(&variance(12.0))), (&reference, Some(&variance(64.0)))).unwrap();
     assert_eq!((z.values, z.beyond_2, z.beyond_3), (9216, 0.0, 0.0));
     close("rms", z.rms, 0.916963772032476);
     close("worst", z.worst, 1.5754992147798985);

@@ -215,8 +215,10 @@ fn white_media_behind_any_boundary_are_invisible() {
         let params = [("max_depth", "-1"), ("rr_depth", "1000000"), ("fallback", "false")];
         let picture = Picture::render(find("path").unwrap(), &scene, &params, 2 * SPP, 1);
         picture.assert_agrees(&Picture::constant(1.0, 16), 1e-3, what);
-        let error = (picture.whole.0 - 1.0).abs();
-        assert!(error < 1e-3, "{what}: {error}");
+        // Where next event reaches the sky its weights scatter; behind glass every path is exact.
+        let (error, spread) = ((picture.whole.0 - 1.0).abs(), picture.whole.1.sqrt());
+        let bound = if what.contains("glass") { 0.0 } else { 4.0 * spread };
+        assert!(error < 1e-3 + bound && spread < 2e-3, "{what}: {error} +- {spread}");
     }
 }
 

@@ -106,7 +106,7 @@ fn leave_one_out_neighbors(points: &[EyeSubpathVertex], groups: &[Range<usize>])
 /// Initial states of the points.
 fn states(points: &[EyeSubpathVertex], groups: &[Range<usize>]) -> Vec<CacheState> {
     let inv_trust_radius2 = groups.iter().flat_map(|group| {
-        let centre = points[group.clone()].iter().map(|c| c.p()).sum::<Vec3>() / group.len() as f32;
+        let centre = points[group.clone()].iter().map(EyeSubpathVertex::p).sum::<Vec3>() / group.len() as f32;
         let sum: f32 = points[group.clone()].iter().map(|c| c.p().distance_squared(centre)).sum();
         let radius2 = TRUST_RADII * TRUST_RADII * sum / group.len() as f32;
         std::iter::repeat_n((1.0 / radius2).min(f32::MAX), group.len())
@@ -306,7 +306,7 @@ mod tests {
             assert!(groups.iter().map(ExactSizeIterator::len).eq(sizes), "{size}");
             assert!(groups.windows(2).all(|w| w[0].end == w[1].start) && groups[0].start == 0);
             for g in &groups {
-                let centre = points[g.clone()].iter().map(|c| c.p()).sum::<Vec3>() / g.len() as f32;
+                let centre = points[g.clone()].iter().map(EyeSubpathVertex::p).sum::<Vec3>() / g.len() as f32;
                 assert!(points[g.clone()].iter().all(|c| c.p().distance(centre) < 0.4));
             }
         }
