@@ -20,11 +20,11 @@ pub struct ZTest {
     pub threshold: f64,
     /// z of the mean of the picture; the channels of a pixel count as one, different pixels as independent.
     pub whole: f64,
-    /// The same question asked of blocks of pixels.
+    /// Differences of blocks of pixels, in units of their spread.
     pub blocks: Option<BlockTest>,
 }
 
-/// What blocks of 16 × 16 pixels say, which may share light sub-paths: variances of single pixels leave out how they go
+/// A test by blocks of 16 × 16 pixels, which may share light sub-paths: variances of single pixels leave out how they go
 /// together. None of pictures of fewer than two blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlockTest {

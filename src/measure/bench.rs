@@ -71,7 +71,7 @@ pub enum Judged {
 }
 
 impl Judged {
-    /// What measurements under these loads can be judged by.
+    /// The numbers by which measurements under these loads can be judged.
     pub fn under(loads: [Option<&Load>; 2]) -> Judged {
         match loads.into_iter().flatten().any(|load| load.disturbance().is_some()) {
             true => Judged::Errors,

@@ -201,7 +201,7 @@ fn subdivided_square() -> String {
 
 #[test]
 fn a_hundred_thousand_lights() {
-    // The lamp of the box hangs a little below it and hides it, unless it is as dark as here.
+    // The box's own lamp is nearly black here: all light is that of the lamp below it.
     let lamp = "<shape type=\"obj\"><string name=\"filename\" value=\"lamp.obj\"/><transform name=\"to_world\">\
         <scale value=\"0.4\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.8\"/></transform>\
         <ref id=\"grey\"/><emitter type=\"area\"><rgb name=\"radiance\" value=\"5\"/></emitter></shape>";

@@ -252,7 +252,7 @@ fn open_boundaries_are_warned_of() {
     let sides: Vec<String> = turns.map(side).into();
     good(&format!("{fog}{}", sides.concat()));
     good(&format!("{fog}<shape type=\"sphere\"><ref name=\"exterior\" id=\"fog\"/></shape>"));
-    // The same medium on both sides ends nowhere.
+    // A surface with one medium on both sides is no boundary of it.
     good(&format!(
         "{fog}<shape type=\"rectangle\"><ref name=\"interior\" id=\"fog\"/><ref name=\"exterior\" id=\"fog\"/></shape>"
     ));
