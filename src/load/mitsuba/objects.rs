@@ -33,6 +33,8 @@ pub(super) struct Builder<'t> {
     pub grids: HashMap<PathBuf, Option<SharedGrid>>,
     /// Elements that a `<ref>` inside of another object names.
     pub referenced: HashSet<usize>,
+    /// Shapes found so far inside of shapes that hold others.
+    pub members: usize,
     /// Elements under construction, outermost first.
     open: Vec<usize>,
 }
@@ -54,6 +56,7 @@ impl<'t> Builder<'t> {
             media: HashMap::new(),
             grids: HashMap::new(),
             referenced,
+            members: 0,
             open: Vec::new(),
         }
     }

@@ -18,6 +18,9 @@ use glam::{DMat4, DVec3};
 const PLUGINS: [&str; 11] =
     ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance", "merge"];
 
+/// Most shapes inside of shapes that hold others: references to a `merge` of `merge`s multiply.
+const MAX_MEMBERS: usize = 1 << 20;
+
 /// A surface of a shape, as long as its file is not read.
 enum Source {
     Mesh(MeshSource),
@@ -134,6 +137,14 @@ impl Builder<'_> {
     fn members(&mut self, p: &Props<'_>) -> Vec<usize> {
         let mut found = vec![];
         for from in p.objects() {
+            if self.members > MAX_MEMBERS {
+                return vec![];
+            }
+            self.members += 1;
+            if self.members > MAX_MEMBERS {
+                let message = format!("shapes inside of shapes are more than {MAX_MEMBERS}");
+                self.push(Diagnostic::error("scene::too-large", message).at(p.span()));
+            }
             let Some(object) = self.resolve(from) else { continue };
             let node = self.node(object);
             if node.tag != "shape" {

@@ -73,3 +73,18 @@ fn a_light_whose_picture_cannot_be_read_is_an_error() {
     let (_, found) = load(&scene(&inside)).unwrap();
     assert_eq!(found.changing_picture().list.len(), 1);
 }
+
+#[test]
+fn merges_of_merges_do_not_multiply_without_end() {
+    let merge = |i: usize, inside: &str| format!("<shape type=\"merge\" id=\"m{i}\">{inside}</shape>");
+    // Each holds the one before twice: 2^40 shapes.
+    let first = merge(0, "<shape type=\"rectangle\"/>");
+    let doubled = |i: usize| merge(i, &format!("<ref id=\"m{}\"/><ref id=\"m{}\"/>", i - 1, i - 1));
+    let many: String = (1..40).map(doubled).collect();
+    let all = format!("{first}{many}");
+    assert_eq!(messages(load(&scene(&all)))[0].0, "scene::too-large");
+    let round = merge(0, "<ref id=\"m1\"/>") + &merge(1, "<ref id=\"m0\"/>");
+    assert_eq!(messages(load(&scene(&round)))[0].0, "scene::circular-reference");
+    let two = good(&merge(0, "<shape type=\"rectangle\"/><shape type=\"merge\"><shape type=\"disk\"/></shape>"));
+    assert_eq!(two.shapes.len(), 3);
+}
