@@ -23,7 +23,7 @@ pub struct EyeSubpathVertex {
 
 impl EyeSubpathVertex {
     /// Position.
-    pub fn p(&self) -> Vec3 {
+    pub fn position(&self) -> Vec3 {
         self.place.position()
     }
 }

@@ -109,104 +109,101 @@ pub fn walk<H: WalkHooks, D: DirectionSampler>(
     sampler: &mut PathSampler,
     hooks: &mut H,
 ) {
+    let walk = Walk { scene, start, rules };
     match scene.media.is_empty() {
-        true => walk_in::<false, H, D>(scene, start, rules, tracer, sampler, hooks),
-        false => walk_in_media(scene, start, rules, tracer, sampler, hooks),
+        true => walk.run::<false>(tracer, sampler, hooks),
+        false => walk.run_in_media(tracer, sampler, hooks),
     }
 }
 
-/// Out of line: the walk of all other scenes stays small.
-#[cold]
-#[inline(never)]
-fn walk_in_media<H: WalkHooks, D: DirectionSampler>(
-    scene: &PreparedScene,
+/// A walk that is to be made.
+struct Walk<'a, D> {
+    scene: &'a PreparedScene,
     start: WalkStart,
-    rules: &WalkRules<D>,
-    tracer: &mut Tracer,
-    sampler: &mut PathSampler,
-    hooks: &mut H,
-) {
-    walk_in::<true, H, D>(scene, start, rules, tracer, sampler, hooks);
+    rules: &'a WalkRules<'a, D>,
 }
 
-/// Walks in a scene with or without media.
-#[inline(always)]
-fn walk_in<const MEDIA: bool, H: WalkHooks, D: DirectionSampler>(
-    scene: &PreparedScene,
-    start: WalkStart,
-    rules: &WalkRules<D>,
-    tracer: &mut Tracer,
-    sampler: &mut PathSampler,
-    hooks: &mut H,
-) {
-    let WalkStart { ray, mut throughput, pdf, mut kind, mut medium } = start;
-    let WalkRules { limits, mode, directions } = *rules;
-    let Ray { mut o, mut d, mut t_min, mut t_max } = ray;
-    let mut edge = Edge::new(o, pdf);
-    let has_masks = scene.features.contains(Features::MASKS);
-    let mut extinction_back = None;
-    let mut point = SurfacePoint::default();
-    let mut bsdf = Bsdf::empty(&point);
-    for index in 1..=limits.max_edges {
-        let ray = Ray { o, d, t_min, t_max };
-        let (wo, unattenuated) = (-d, throughput);
-        let mut next =
-            NextEdge { scene, ray, medium, edge: &mut edge, point: &mut point, extinction_back, throughput, index };
-        let arrival = if MEDIA {
-            let arrival = next.fly(kind, tracer, sampler, hooks);
-            medium = next.medium;
-            throughput *= edge.flight.throughput();
-            arrival
-        } else {
-            next.meet(has_masks, kind, tracer, sampler, hooks)
-        };
-        let (hit, medium_point);
-        let (place, media) = match arrival {
-            Arrival::Escaped => {
-                hooks.escaped(index, d, throughput, &edge);
+impl<D: DirectionSampler> Walk<'_, D> {
+    /// Walks in a scene with media. Out of line: the walk of all other scenes stays small.
+    #[cold]
+    #[inline(never)]
+    fn run_in_media(self, tracer: &mut Tracer, sampler: &mut PathSampler, hooks: &mut impl WalkHooks) {
+        self.run::<true>(tracer, sampler, hooks);
+    }
+
+    /// Walks in a scene with or without media.
+    #[inline(always)]
+    fn run<const MEDIA: bool>(self, tracer: &mut Tracer, sampler: &mut PathSampler, hooks: &mut impl WalkHooks) {
+        let Walk { scene, start, rules } = self;
+        let WalkStart { ray, mut throughput, pdf, mut kind, mut medium } = start;
+        let WalkRules { limits, mode, directions } = *rules;
+        let Ray { mut o, mut d, mut t_min, mut t_max } = ray;
+        let mut edge = Edge::new(o, pdf);
+        let has_masks = scene.features.contains(Features::MASKS);
+        let mut extinction_back = None;
+        let mut point = SurfacePoint::default();
+        let mut bsdf = Bsdf::empty(&point);
+        for index in 1..=limits.max_edges {
+            let ray = Ray { o, d, t_min, t_max };
+            let (wo, unattenuated) = (-d, throughput);
+            let mut next =
+                NextEdge { scene, ray, medium, edge: &mut edge, point: &mut point, extinction_back, throughput, index };
+            let arrival = if MEDIA {
+                let arrival = next.fly(kind, tracer, sampler, hooks);
+                medium = next.medium;
+                throughput *= edge.flight.throughput();
+                arrival
+            } else {
+                next.meet(has_masks, kind, tracer, sampler, hooks)
+            };
+            let (hit, medium_point);
+            let (place, media) = match arrival {
+                Arrival::Escaped => {
+                    hooks.escaped(index, d, throughput, &edge);
+                    return;
+                }
+                Arrival::Surface(met, material) => {
+                    hit = met;
+                    material.resolve_into(&mut bsdf, &point, wo);
+                    let media = if MEDIA { scene.media_beside(&hit, medium) } else { [MediumNumber::VACUUM; 2] };
+                    (Place::Surface { point: &point, hit: &hit }, media)
+                }
+                Arrival::Collided(met) => {
+                    medium_point = met;
+                    bsdf.set_phase(scene.medium_scattering(&medium_point));
+                    (Place::Medium(&medium_point), [medium; 2])
+                }
+            };
+            let scatter = Scatter(&bsdf);
+            let vertex = Vertex { index, place, scatter, wo, throughput, unattenuated, media, edge: &edge };
+            if !hooks.vertex(&vertex, tracer, sampler) || index == limits.max_edges {
                 return;
             }
-            Arrival::Surface(met, material) => {
-                hit = met;
-                material.resolve_into(&mut bsdf, &point, wo);
-                let media = if MEDIA { scene.media_beside(&hit, medium) } else { [MediumNumber::VACUUM; 2] };
-                (Place::Surface { point: &point, hit: &hit }, media)
-            }
-            Arrival::Collided(met) => {
-                medium_point = met;
-                bsdf.set_phase(scene.medium_scattering(&medium_point));
-                (Place::Medium(&medium_point), [medium; 2])
-            }
-        };
-        let scatter = Scatter(&bsdf);
-        let vertex = Vertex { index, place, scatter, wo, throughput, unattenuated, media, edge: &edge };
-        if !hooks.vertex(&vertex, tracer, sampler) || index == limits.max_edges {
-            return;
-        }
 
-        let u = sampler.vertex(index, SampleSlot::Scatter);
-        let p = vertex.position();
-        let Some(sample) = directions.sample(p, &vertex.scatter, wo, [u[0], u[1], u[2]], mode) else { return };
-        let survival = limits.survival(index, &vertex.scatter);
-        if u[3] >= survival {
-            return;
+            let u = sampler.vertex(index, SampleSlot::Scatter);
+            let p = vertex.position();
+            let Some(sample) = directions.sample(p, &vertex.scatter, wo, [u[0], u[1], u[2]], mode) else { return };
+            let survival = limits.survival(index, &vertex.scatter);
+            if u[3] >= survival {
+                return;
+            }
+            throughput *= sample.value * (1.0 / (sample.pdf.0 * survival));
+            if throughput.is_black() {
+                return;
+            }
+            hooks.leaving(&vertex, &sample);
+            if MEDIA {
+                medium = vertex.medium_towards(sample.wi);
+                extinction_back = vertex.place.extinction();
+            }
+            let end = vertex.place.segment_end();
+            edge = Edge { delta: sample.delta, survival, ..Edge::new(p, sample.pdf) };
+            (o, d) = (end.leaving(sample.wi), sample.wi);
+            (t_min, t_max) = (T_MIN, f32::INFINITY);
+            kind = match mode {
+                Transport::Radiance => RayKind::Bounce,
+                Transport::Importance => RayKind::LightBounce,
+            };
         }
-        throughput *= sample.value * (1.0 / (sample.pdf.0 * survival));
-        if throughput.is_black() {
-            return;
-        }
-        hooks.leaving(&vertex, &sample);
-        if MEDIA {
-            medium = vertex.medium_towards(sample.wi);
-            extinction_back = vertex.place.extinction();
-        }
-        let end = vertex.place.segment_end();
-        edge = Edge { delta: sample.delta, survival, ..Edge::new(p, sample.pdf) };
-        (o, d) = (end.leaving(sample.wi), sample.wi);
-        (t_min, t_max) = (T_MIN, f32::INFINITY);
-        kind = match mode {
-            Transport::Radiance => RayKind::Bounce,
-            Transport::Importance => RayKind::LightBounce,
-        };
     }
 }

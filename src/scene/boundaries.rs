@@ -3,7 +3,7 @@
 use super::desc::{MediumId, SceneDesc, ShapeDesc, ShapeGeometry};
 use super::diag::{Diagnostic, Diagnostics};
 use super::medium::InterfaceDesc;
-use crate::math::{DMat4, DVec3};
+use crate::math::DVec3;
 use crate::scene::RoundKind;
 use std::collections::HashMap;
 
@@ -14,17 +14,16 @@ const WELD: f64 = 1e-6;
 pub(super) fn media(scene: &SceneDesc, out: &mut Diagnostics) {
     for medium in (0..scene.media.len() as u32).map(MediumId) {
         let bounds = |shape: &&ShapeDesc| shape.interface.is_some_and(|interface| separates(interface, medium));
-        let mut boundary = Boundary::default();
-        for shape in scene.shapes.iter().filter(bounds) {
-            boundary.add(scene, shape, DMat4::IDENTITY);
-        }
-        for instance in &scene.instances {
-            let shapes = scene.groups.get(instance.group.index()).map(|group| group.shapes.as_slice());
-            for shape in shapes.unwrap_or_default().iter().filter(bounds) {
-                boundary.add(scene, shape, instance.to_world);
-            }
-        }
-        let free = boundary.free_edges();
+        // A group is closed, or is not, wherever its instances are.
+        let groups = scene.groups.iter().map(|group| group.shapes.as_slice());
+        let places = std::iter::once(scene.shapes.as_slice()).chain(groups);
+        let free: usize = places
+            .map(|shapes| {
+                let mut boundary = Boundary::default();
+                shapes.iter().filter(bounds).for_each(|shape| boundary.add(scene, shape));
+                boundary.free_edges()
+            })
+            .sum();
         if free > 0 {
             let message = format!("the boundary of a medium is open: {free} of its edges belong to one triangle alone");
             let help = "paths that leave it through a gap stay in the medium, unless other surfaces close it";
@@ -48,15 +47,15 @@ struct Boundary {
 }
 
 impl Boundary {
-    fn add(&mut self, scene: &SceneDesc, shape: &ShapeDesc, to_world: DMat4) {
-        let to_world = to_world * shape.to_world;
+    fn add(&mut self, scene: &SceneDesc, shape: &ShapeDesc) {
         match shape.geometry {
             ShapeGeometry::Round(RoundKind::Sphere) => {}
             ShapeGeometry::Round(RoundKind::Disk) => self.open_round += 1,
             ShapeGeometry::Round(RoundKind::Cylinder) => self.open_round += 2,
             ShapeGeometry::Mesh(mesh) => {
                 let Some(mesh) = scene.meshes.get(mesh.index()) else { return };
-                let corner = |v: u32| mesh.positions.get(v as usize).map(|p| to_world.transform_point3(p.as_dvec3()));
+                let corner =
+                    |v: u32| mesh.positions.get(v as usize).map(|p| shape.to_world.transform_point3(p.as_dvec3()));
                 let sound = mesh.triangles.iter().filter_map(|t| Some([corner(t[0])?, corner(t[1])?, corner(t[2])?]));
                 self.corners.extend(sound);
             }

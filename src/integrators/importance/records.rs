@@ -44,10 +44,11 @@ impl ImportanceRecords {
     /// Records on surfaces: the vertices of `fraction` times as many eye sub-paths as the picture has pixels.
     pub fn on_surfaces(warm_up: &WarmUp, fraction: f64) -> (ImportanceRecords, RayStats) {
         let (found, stats) = warm_up.eye_vertices(fraction);
-        let positions: Vec<Vec3> = found.vertices.iter().map(EyeSubpathVertex::p).collect();
+        let positions: Vec<Vec3> = found.vertices.iter().map(EyeSubpathVertex::position).collect();
         let all: Vec<_> = morton::order(&positions).into_iter().map(|i| found.vertices[i as usize]).collect();
         let normals: Vec<Vec3> = all.iter().map(|c| c.side).collect();
-        let index = NearestPoints::new(all.iter().map(EyeSubpathVertex::p).collect(), normals.clone(), Metric::Facing);
+        let index =
+            NearestPoints::new(all.iter().map(EyeSubpathVertex::position).collect(), normals.clone(), Metric::Facing);
         let ends = all.iter().map(|c| c.place.segment_end()).collect();
         let finder = Finder::Nearest(Box::new(index));
         (ImportanceRecords { ends, normals: Some(normals), finder }, stats)
@@ -61,7 +62,7 @@ impl ImportanceRecords {
         let (found, stats) = warm_up.eye_vertices(COUNTED / pixels);
         let mut mapped = vec![0u32; skeleton.nodes.len()];
         for v in &found.vertices {
-            if let Some(node) = skeleton.node_of(v.p(), v.side) {
+            if let Some(node) = skeleton.node_of(v.position(), v.side) {
                 mapped[node] += 1;
             }
         }

@@ -75,8 +75,8 @@ fn group(points: &mut [EyeSubpathVertex], size: usize, first: usize, groups: &mu
         groups.push(first..first + points.len());
         return;
     }
-    let lo = points.iter().fold(Vec3::INFINITY, |lo, c| lo.min(c.p()));
-    let hi = points.iter().fold(Vec3::NEG_INFINITY, |hi, c| hi.max(c.p()));
+    let lo = points.iter().fold(Vec3::INFINITY, |lo, c| lo.min(c.position()));
+    let hi = points.iter().fold(Vec3::NEG_INFINITY, |hi, c| hi.max(c.position()));
     let sides = hi - lo;
     let axis = if sides.x >= sides.y && sides.x >= sides.z {
         0
@@ -86,7 +86,7 @@ fn group(points: &mut [EyeSubpathVertex], size: usize, first: usize, groups: &mu
         2
     };
     let middle = points.len().div_ceil(2).next_multiple_of(size).min(points.len() - 1);
-    points.select_nth_unstable_by(middle, |a, b| a.p()[axis].total_cmp(&b.p()[axis]));
+    points.select_nth_unstable_by(middle, |a, b| a.position()[axis].total_cmp(&b.position()[axis]));
     let (left, right) = points.split_at_mut(middle);
     group(left, size, first, groups);
     group(right, size, first + middle, groups);
@@ -96,7 +96,7 @@ fn group(points: &mut [EyeSubpathVertex], size: usize, first: usize, groups: &mu
 fn leave_one_out_neighbors(points: &[EyeSubpathVertex], groups: &[Range<usize>]) -> Vec<u16> {
     let nearest = |group: &Range<usize>, own: usize| {
         let mut others: Vec<usize> = group.clone().filter(|&i| i != own).collect();
-        let distance = |i: &usize| points[own].p().distance_squared(points[*i].p());
+        let distance = |i: &usize| points[own].position().distance_squared(points[*i].position());
         others.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         others.iter().take(MAX_NEIGHBORS).fold(0, |bits, i| bits | 1 << (i - group.start))
     };
@@ -106,13 +106,13 @@ fn leave_one_out_neighbors(points: &[EyeSubpathVertex], groups: &[Range<usize>])
 /// Initial states of the points.
 fn states(points: &[EyeSubpathVertex], groups: &[Range<usize>]) -> Vec<CacheState> {
     let inv_trust_radius2 = groups.iter().flat_map(|group| {
-        let centre = points[group.clone()].iter().map(EyeSubpathVertex::p).sum::<Vec3>() / group.len() as f32;
-        let sum: f32 = points[group.clone()].iter().map(|c| c.p().distance_squared(centre)).sum();
+        let centre = points[group.clone()].iter().map(EyeSubpathVertex::position).sum::<Vec3>() / group.len() as f32;
+        let sum: f32 = points[group.clone()].iter().map(|c| c.position().distance_squared(centre)).sum();
         let radius2 = TRUST_RADII * TRUST_RADII * sum / group.len() as f32;
         std::iter::repeat_n((1.0 / radius2).min(f32::MAX), group.len())
     });
     let state = |(c, inv_trust_radius2): (&EyeSubpathVertex, f32)| CacheState {
-        p: c.p(),
+        p: c.position(),
         inv_trust_radius2,
         side: c.side,
         means: [0.0; 3],
@@ -137,7 +137,8 @@ impl CachePoints {
             group(&mut all[first..first + count], settings.group_size, first, &mut groups);
             first += count;
         }
-        let (points, sides) = (all.iter().map(EyeSubpathVertex::p).collect(), all.iter().map(|c| c.side).collect());
+        let (points, sides) =
+            (all.iter().map(EyeSubpathVertex::position).collect(), all.iter().map(|c| c.side).collect());
         let index = NearestPoints::new(points, sides, metric);
         let index = if settings.second_stage.is_some() { index.within_groups(&groups) } else { index };
         let each = || all.iter().map(|c| (c.wo, c.bsdf)).collect();
@@ -306,8 +307,8 @@ mod tests {
             assert!(groups.iter().map(ExactSizeIterator::len).eq(sizes), "{size}");
             assert!(groups.windows(2).all(|w| w[0].end == w[1].start) && groups[0].start == 0);
             for g in &groups {
-                let centre = points[g.clone()].iter().map(EyeSubpathVertex::p).sum::<Vec3>() / g.len() as f32;
-                assert!(points[g.clone()].iter().all(|c| c.p().distance(centre) < 0.4));
+                let centre = points[g.clone()].iter().map(EyeSubpathVertex::position).sum::<Vec3>() / g.len() as f32;
+                assert!(points[g.clone()].iter().all(|c| c.position().distance(centre) < 0.4));
             }
         }
         let mut groups = vec![];

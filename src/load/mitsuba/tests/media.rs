@@ -260,4 +260,10 @@ fn open_boundaries_are_warned_of() {
         let found = messages(load(&scene(&format!("{fog}{open}"))));
         assert_eq!(found.iter().map(|m| m.0).collect::<Vec<_>>(), ["scene::open-boundary"], "{open}");
     }
+    // A group counts once, however often it is placed.
+    let tube = "<shape type=\"cylinder\"><ref name=\"interior\" id=\"fog\"/></shape>";
+    let group = format!("<shape type=\"shapegroup\" id=\"group\">{tube}</shape>");
+    let instance = "<shape type=\"instance\"><ref id=\"group\"/></shape>".repeat(3);
+    let (_, found) = load(&scene(&format!("{fog}{group}{instance}"))).unwrap();
+    assert!(found.list.len() == 1 && found.list[0].message.contains("2 of its edges"), "{:?}", found.list);
 }
